@@ -1,4 +1,4 @@
-"""Checkpoints for acting: environment and policy, without executing code of the file."""
+"""Loading of checkpoints for acting, without executing code from their files."""
 
 import json
 import zipfile
@@ -21,13 +21,13 @@ Size = int | dict[str, int]
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
-    """Return the policy of a checkpoint of this package or of Stable-Baselines3.
+    """Load the policy in a checkpoint of this package or of Stable-Baselines3.
 
-    Only its weights are read.
+    Its weights are read; pickles in the file are loaded only if they are needed, with `trust`.
 
     Raises:
-        CheckpointError: it was made for another version or environment, or it fails in
-            `sb3_files.load`.
+        CheckpointError: the checkpoint is of another version or for another environment, or
+            `sb3_files.load` rejects it.
     """
     if meta := read_meta(path):
         check_made_for(path, meta, env_info)
@@ -35,7 +35,7 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Age
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Return the description in a checkpoint.
+    """Return the metadata in a checkpoint.
 
     Raises:
         CheckpointError: the file does not exist, or is not a checkpoint of this package.
@@ -52,10 +52,10 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def read_meta(path: Path) -> dict[str, Any]:
-    """Return the description in a checkpoint; an empty one for a file of Stable-Baselines3.
+    """Return the metadata in a checkpoint; they are empty for a file of Stable-Baselines3.
 
     Raises:
-        CheckpointError: the file does not exist, or is neither of them.
+        CheckpointError: the file does not exist, or is neither of the two.
     """
     try:
         return describe(path)

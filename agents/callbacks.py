@@ -1,4 +1,4 @@
-"""Callbacks of a training: growing safety term, progress, curves, checkpoints, Ctrl-C."""
+"""Training callbacks: ramp of the safety term, progress, curves, checkpoints and Ctrl-C."""
 
 import json
 import signal
@@ -38,7 +38,7 @@ class Ramp:
     """A share that grows linearly from 0 to 1."""
 
     n_steps: int
-    """Number of environment steps until 1; 0: it is 1 from the start."""
+    """Number of environment steps until the share is 1; with 0, it is 1 from the start."""
 
     def __post_init__(self) -> None:
         if self.n_steps < 0:
@@ -50,10 +50,11 @@ class Ramp:
 
 
 class Curriculum(BaseCallback):
-    """Sets the proximity term's weight, and the limit in force, before every rollout.
+    """Sets the weight of the proximity term, and the current cost limit, before every rollout.
 
-    A resumed run continues it. With the whole weight from the start a learner first learns to stay
-    away, and finds its goals about nine times later; its final policy is more careful.
+    A resumed run continues the ramp where it stopped. With the full weight from the start, a
+    learner first learns to stay away from people and needs about nine times as long to find its
+    goals; its final policy is more careful.
     """
 
     def __init__(self, ramp: Ramp, env: HRCVecEnv) -> None:
@@ -85,12 +86,12 @@ class ProximityRamp(Curriculum):
         model.learn(1_000_000, callback=ProximityRamp(400_000))
 
     Args:
-        n_steps: environment steps until the weight is the environment's (`RewardConfig`), as `train
-            --ramp`.
+        n_steps: environment steps until the weight reaches that of the environment's
+            `RewardConfig`; the option `--ramp` of `train`.
 
     Raises:
-        ConfigError: fewer than 0 steps; or, at the start of the training, the environment is not an
-            `HRCVecEnv`.
+        ConfigError: `n_steps` is negative or, at the start of the training, the environment is not
+            an `HRCVecEnv`.
     """
 
     def __init__(self, n_steps: int = 400_000) -> None:
@@ -109,7 +110,7 @@ class ProximityRamp(Curriculum):
 class Interrupt:
     """Handler of Ctrl-C, active after `listen`.
 
-    The first Ctrl-C sets `asked`, and the second one interrupts.
+    The first Ctrl-C sets `asked`, and the second one raises `KeyboardInterrupt`.
     """
 
     def __init__(self) -> None:
@@ -137,7 +138,7 @@ class Interrupt:
 Curve = list[dict[str, float]]
 """A learning curve, with one entry per rollout.
 
-For SAC, with rollouts of single steps, it has one entry per `LEAST_STEPS`.
+For SAC, where a rollout is a single step, it has one entry per `LEAST_STEPS` environment steps.
 """
 LEAST_STEPS = 2048
 """Environment steps between entries of SAC's curve."""
@@ -147,11 +148,11 @@ class TrainingLog:
     """The curve of a run, its checkpoints, and its progress display.
 
     Args:
-        learner: the learner; its logger writes for TensorBoard.
+        learner: learner of Stable-Baselines3, whose logger writes to TensorBoard.
         folder: folder of the run.
         facts: description to store in the checkpoint.
-        curve: the curve of an earlier part of the run; it is extended.
-        meter: the progress display.
+        curve: learning curve of the earlier part of the run, to which entries are appended.
+        meter: progress display.
     """
 
     def __init__(
@@ -164,14 +165,14 @@ class TrainingLog:
         self.begin()
 
     def begin(self) -> None:
-        """Start the clock."""
+        """Start the clock of the curve and of checkpoints."""
         self.started_s = self.saved_s = time.monotonic()
 
     def note(self, weights: dict[str, float]) -> None:
         """Add a point to the curve if an episode has ended, and show the progress.
 
         Args:
-            weights: weights of the last rollout by name.
+            weights: weights in the last rollout, by their name in the curve.
         """
         n_steps, note = self.learner.num_timesteps, ""
         if self.recent:
@@ -198,7 +199,7 @@ class TrainingLog:
 
 
 class TrainingMonitor(BaseCallback):
-    """Keeps the log of a run of Stable-Baselines3, with a checkpoint every minute and at the end.
+    """Logs a training by Stable-Baselines3, with a checkpoint every minute and at the end.
 
     Ctrl-C ends the training after the current step.
     """
@@ -241,11 +242,11 @@ class TrainingMonitor(BaseCallback):
 
 
 Y_WIDTH = 20
-"""Greatest number of characters in a line beside an axis."""
+"""Maximum number of characters in a line of a y-axis label."""
 
 
 class Panel(NamedTuple):
-    """A panel of a learning curve."""
+    """Label and colour of a panel in the plot of a learning curve."""
 
     label: str
     colour: str
@@ -257,16 +258,16 @@ PANELS = {
     "contacts_per_episode": Panel("true contacts per episode", "tab:red"),
     "close_steps_per_episode": Panel("steps < 15 cm per episode", "tab:orange"),
 }
-"""Panels of a learning curve by metric."""
+"""Panels in the plot of a learning curve, by metric."""
 LIMITED = {
     "cost": Panel("cost per episode, smoothed (dashed: the limit)", "tab:brown"),
     "multiplier": Panel("multiplier", "tab:purple"),
 }
-"""Further panels for a run with a cost limit."""
+"""Additional panels for a run with a cost limit, by metric."""
 
 
 def plot_curve(curve: Curve, path: Path, title: str) -> None:
-    """Draw goals, contacts and cost over environment steps into a PNG."""
+    """Plot goals, contacts and cost over environment steps, and save the figure as PNG."""
     steps = np.array([point["steps"] for point in curve])
     share = np.array([point.get("safety_share", 1.0) for point in curve])
     growing = steps[(share > 0) & (share < 1)]

@@ -1,4 +1,4 @@
-"""Checkpoints: a learner of Stable-Baselines3, and a description of its environment."""
+"""Checkpoints with a learner of Stable-Baselines3 and a description of its environment."""
 
 import json
 import os
@@ -28,14 +28,14 @@ with learner():
 KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
 """Classes of learners by algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
-"""Arguments that load a learner for acting, without replay buffer."""
+"""Arguments for loading a learner without its replay buffer, for acting only."""
 Learner: TypeAlias = "PPO | SAC"
 
 
 def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     """Write a checkpoint: the learner, the scale of rewards, and a description of its environment.
 
-    An interrupted write leaves no partial file (temporary file, then rename).
+    An interrupted write leaves no partial file, since a complete temporary file is renamed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.zip")
@@ -64,13 +64,13 @@ def get_algorithm(learner: Learner) -> str:
 
 
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
-    """Return the learner of a checkpoint, ready to continue on environments.
+    """Load the learner of a checkpoint to continue its training on `env`.
 
-    PPO keeps its scale of rewards. SAC acts by its policy, and learns again when its buffer holds
-    an episode of every environment.
+    PPO keeps its scale of rewards. SAC first refills its replay buffer with actions of its policy,
+    and continues to learn when the buffer holds an episode of every environment.
 
     Raises:
-        CheckpointError: it was made for another version or another environment.
+        CheckpointError: the checkpoint is of another version or for another environment.
     """
     meta = describe(path)
     check_fits(path, meta, _get_size(env.observation_space), _get_size(env.action_space))
@@ -91,12 +91,12 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """Return a trained policy for acting, with its learner.
+    """Load a trained policy for acting, with its learner.
 
-    The learner is unpickled, so this is for runs of the user's own.
+    The learner is unpickled, which can execute code from the file: use it for your own runs only.
 
     Raises:
-        CheckpointError: it was made for another version or another environment.
+        CheckpointError: the checkpoint is of another version or for another environment.
     """
     meta = describe(path)
     check_made_for(path, meta, env_info)
@@ -105,7 +105,7 @@ def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
 
 
 class TrainedAgent:
-    """The mean action of a trained policy."""
+    """An agent that takes the mean action of a trained policy."""
 
     def __init__(self, learner: Learner) -> None:
         self.learner = learner
@@ -113,7 +113,7 @@ class TrainedAgent:
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return deterministic actions (..., A).
 
-        Only the observation's parts used in training count.
+        Parts of an observation that were not used in training are ignored.
         """
         space = self.learner.observation_space
         if isinstance(observation, Mapping):

@@ -1,8 +1,8 @@
 """Behaviour cloning: a policy learns the scripted agent's actions in states that it reaches itself.
 
-The scripted agents have no memory, so they can be queried for any observation: rounds of DAgger
-(Ross et al. 2011, arXiv:1011.0686), in which policy and expert act in turns, so that late parts of
-an episode are reached, too. In the first round the expert acts alone, with occasional disturbances.
+Scripted agents have no memory and can be queried for any observation, which permits rounds of
+DAgger (Ross et al. 2011, arXiv:1011.0686). Policy and expert take turns in acting, to also reach
+late parts of an episode. In the first round the expert acts alone, with occasional disturbances.
 Targets are always the expert's actions.
 """
 
@@ -26,13 +26,13 @@ with learner():
 
 Arrays = dict[str, NDArray[np.float32]]
 LEAST_SPREAD = 0.05
-"""Least standard deviation of a policy's actions after the cloning."""
+"""Minimum standard deviation of a policy's actions after cloning."""
 FLAT = ""
 """Name of an observation without parts."""
 
 
 class Demonstrations(NamedTuple):
-    """Observations with the expert's actions."""
+    """Observations, with the actions of the expert for them."""
 
     observations: Arrays
     """Observations (N, ...) by part."""
@@ -45,9 +45,9 @@ class CloningSettings:
     """Amount of demonstrations, and settings of the optimization."""
 
     rounds: int = 4
-    """Number of rounds of gathering and learning."""
+    """Number of rounds, each of collecting demonstrations and learning from them."""
     steps: int = 2000
-    """Gradient steps of each round, over all demonstrations; three times as many in the last."""
+    """Gradient steps per round on all demonstrations; the last round has three times as many."""
     batch_size: int = 256
     """Number of observations in a gradient step."""
     learning_rate: float = 1e-3
@@ -69,15 +69,15 @@ def clone(
 ) -> list[float]:
     """Train a policy to imitate the task's scripted agent; return the errors per round.
 
-    The scripted agent does not yield.
+    The scripted agent does not slow down near people.
 
     Args:
         policy: policy of a learner of Stable-Baselines3; its mean action is trained.
-        env: environments for the demonstrations, which are seeded and reset.
-        n_episodes: number of episodes of the task's length, in all rounds together.
+        env: environments for the demonstrations; they are seeded and reset.
+        n_episodes: number of episodes of full length, over all rounds.
         settings: settings of the training.
         seed: seed of episodes, disturbances and batches.
-        tick: is called with the growth of the completed share.
+        tick: function that is called with each increase of the completed share.
 
     Returns:
         Mean error of actions after each round.
@@ -103,7 +103,7 @@ def clone(
             tick(1 / (settings.rounds * n_steps))
         n = settings.steps if k < settings.rounds - 1 else 3 * settings.steps
         errors.append(_learn(policy, _stack(shown), n, settings, rng))
-    if isinstance(policy, ActorCriticPolicy):  # exploration no larger than the error
+    if isinstance(policy, ActorCriticPolicy):  # exploration is no larger than the error
         policy.log_std.data.fill_(math.log(max(errors[-1], LEAST_SPREAD)))
     return errors
 

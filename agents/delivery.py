@@ -1,11 +1,11 @@
-"""A driver without learning, which decides from the observation and the map alone.
+"""Scripted delivery by a mobile base, decided from the observation and the map alone.
 
-The route is the descent of a field of path lengths (Dijkstra) from the zone, in which ground near
-standing people is expensive; fields are cached, as they change only when a person stops or sets
-off. Velocities are chosen as in a dynamic window (Fox, Burgard and Thrun 1997,
-doi:10.1109/100.580977): by the position after two seconds, along the field, past obstacles and past
-the predicted positions of people. The base drives around people who stand and wait for it, so that
-the two do not wait for each other.
+The route descends a field of path lengths to the zone (Dijkstra), in which ground near standing
+people is expensive. Fields are cached, since they change only when a person stops or starts
+walking. Velocities are chosen as in a dynamic window (Fox, Burgard and Thrun 1997,
+doi:10.1109/100.580977), by their positions in the next two seconds: path length, and clearance to
+obstacles and to the predicted positions of people. The base drives around people who stand and wait
+for it, to avoid a deadlock.
 """
 
 from typing import NamedTuple
@@ -27,45 +27,45 @@ CELL_M = 0.2
 BEYOND_M = 3.0
 """Margin of the fields beyond the area where people walk [m]."""
 FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
-"""Clearance of free ground, least clearance of a route [m], and the factor on lengths between."""
+"""Clearance of free ground, minimum clearance of a route [m], and cost factor between the two."""
 BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
 """Radii of a person, of the base in any orientation, and of two discs that contain it [m].
 
-The discs are ahead of and behind its middle by the last number.
+The discs are `DISC_AT_M` ahead of and behind the centre of the base.
 """
 STANDS_M_S, STOOD_M, STOOD_DEAR, SPOT_M = 0.25, 1.1, 6.0, 0.4
-"""Speed below which a person stands; radius of expensive ground around them; its factor; rounding.
+"""Speed below which a person stands [m/s]; radius [m] and factor of expensive ground around them.
 
-Positions of standing people are rounded to the last number [m].
+Positions of standing people are rounded to multiples of `SPOT_M`.
 """
 BRAKE_M_S2, GONE_S, KEEP_M = 1.5, 0.3, 0.2
 """Parameters of the speed limit towards a person: sqrt(2 a (gap - 0.3 s v - 0.2 m)).
 
-a is the deceleration, v the person's speed.
+Here a is the deceleration and v the person's speed.
 """
 SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
-"""Speeds of the velocities that are compared, and number of their headings."""
+"""Speeds of the candidate velocities [m/s], and number of their headings."""
 TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
-"""Times at which velocities are evaluated [s]."""
+"""Times after which candidate velocities are evaluated [s]."""
 NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
-"""Distance to its zone below which the base makes straight for the middle, gain, and stop [m]."""
+"""Distance below which the zone is approached straight [m], gain [1/s], stopping distance [m]."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
-"""Clearance to people without a price [m], and prices relative to a metre of the route."""
+"""Clearance to people without a cost [m], and costs relative to a metre of the route."""
 BESIDE_M, NEAR_PRICE = 0.25, 4.0
-"""Further clearance to obstacles without a price [m], and the price of less.
+"""Additional clearance to obstacles [m], and the cost of a smaller one.
 
-An imitating policy makes errors, for which this leaves room.
+It leaves room for the errors of a policy that imitates this agent.
 """
 SLOW_M_S, STAY_M = 0.2, 0.25
-"""Speed below which the base turns along the route [m/s], unless a person is this close [m]."""
+"""Speed below which the base turns along the route [m/s], if no person is within `STAY_M` [m]."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
-"""Price of a change of velocity, gain of turns [1/s], and fastest turn [rad/s]."""
+"""Cost of a change of velocity, gain of turns [1/s], and maximum turn rate [rad/s]."""
 FIELDS = 1024
 """Number of cached fields."""
 
 
 class People(NamedTuple):
-    """Estimated workers, far away if they are not tracked."""
+    """Estimated workers; those that are not tracked are far away."""
 
     position: Array
     """Horizontal positions relative to the base (n, W, 2) [m]."""
@@ -74,7 +74,7 @@ class People(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Positions in a grid."""
+    """Cells of a grid that contain positions, and the offsets within them."""
 
     i: Indices
     j: Indices
@@ -84,11 +84,8 @@ class Cells(NamedTuple):
     """Share of a cell along the second axis."""
 
 
-"""Number that is kept."""
-
-
 class Deliverer:
-    """Drives by a route and a dynamic window, with or without yielding."""
+    """An agent that drives by a route and a dynamic window, and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
@@ -109,7 +106,7 @@ class Deliverer:
         self._most = env_info.control_config.joint_speed_share * fastest
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., 3) towards the zone, around people."""
+        """Return actions (..., 3) that drive to the zone and avoid people."""
         terms = split(observation, self.env_info.layout)
         shape = terms["slide_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
@@ -134,7 +131,7 @@ class Deliverer:
         return action.reshape(*shape, -1).astype(np.float32)
 
     def _find_fields(self, place: Array, zone: Array, people: People) -> Indices:
-        """Return the row of the field that each base follows (n,), for its zone and people."""
+        """Return the index (n,) of the cached field for the zone and the people of each base."""
         stands = np.linalg.norm(people.velocity, axis=-1) < STANDS_M_S
         spots = np.rint((place[:, None] + people.position) / SPOT_M)
         rows = np.empty(len(place), np.int64)
@@ -148,7 +145,7 @@ class Deliverer:
         return rows
 
     def _make_field(self, key: tuple[tuple[int, int], ...]) -> int:
-        """Compute a field in place of the least recently used one; return its row."""
+        """Compute a field in place of the least recently used one; return its index."""
         row = len(self._rows)
         if row == len(self._fields):
             row = self._rows.pop(next(iter(self._rows)))
@@ -163,7 +160,7 @@ class Deliverer:
     def _choose_velocity(
         self, place: Array, speed: Array, yaw: Array, zone: Array, field: Indices, people: People
     ) -> Array:
-        """Return the cheapest velocities (n, 2) [m/s]."""
+        """Return the candidate velocities (n, 2) of lowest cost [m/s]."""
         n, away_m = len(place), np.linalg.norm(zone, axis=1)
         straight = (
             zone * np.minimum(NEAR_GAIN_HZ, SPEEDS_M_S[-1] / np.maximum(away_m, 1e-6))[:, None]
@@ -196,7 +193,7 @@ class Deliverer:
         return low * (1 - u) + high * u
 
     def _interpolate(self, grid: Array, at: Array) -> Array:
-        """Return a grid's values between its points, at positions (..., 2)."""
+        """Return bilinearly interpolated values of a grid at positions (..., 2)."""
         i, j, u, v = self._locate(at)
         low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
         return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
@@ -209,7 +206,7 @@ class Deliverer:
         return Cells(low[..., 0], low[..., 1], share[..., 0], share[..., 1])
 
     def _compute_turn(self, place: Array, yaw: Array, towards: Array) -> Array:
-        """Return turn rates (n,) [rad/s] towards directions (n, 2), 0 without room to turn."""
+        """Return turn rates (n,) [rad/s] towards directions (n, 2), or 0 without room to turn."""
         wanted = np.arctan2(towards[:, 1], towards[:, 0])
         error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
         rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
@@ -224,7 +221,7 @@ class Deliverer:
 
 
 def _read_people(terms: dict[str, Array]) -> People:
-    """Return the workers of observations."""
+    """Return the estimated workers in observations."""
     n = len(terms["way_left"])
     joints = terms["worker_joints_from_tool"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     moving = terms["worker_joints_velocity"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
@@ -233,7 +230,7 @@ def _read_people(terms: dict[str, Array]) -> People:
 
 
 def _predict_shifts(speed: Array, window: Array) -> Array:
-    """Return displacements (n, C, T, 2) of velocities that the base reaches at its slew rate."""
+    """Return displacements (n, C, T, 2) of the base while it accelerates to each velocity."""
     change = window - speed
     ramp = np.abs(change) / BRAKE_M_S2
     t, ramp, change = TIMES_S[:, None], ramp[:, :, None], change[:, :, None]
@@ -243,7 +240,7 @@ def _predict_shifts(speed: Array, window: Array) -> Array:
 
 
 def _price_people(shift: Array, window: Array, people: People) -> Array:
-    """Return the price (n, C) of future proximity to people, and of driving towards them."""
+    """Return the cost (n, C) of future proximity to people, and of driving towards them."""
     price = np.zeros(shift.shape[:2])
     for w in range(people.position.shape[1]):
         position, moving = people.position[:, w], people.velocity[:, w]

@@ -1,8 +1,8 @@
-"""A board holder without learning, which decides from the observation alone.
+"""Scripted holding of a drywall board, decided from the observation alone.
 
-The cups move above the board, down onto it, and suck. The board is lifted and set upright, carried
-around the robot to a point before its place, and pressed against the studs, where it stays until it
-is fixed.
+The suction cups move above the board, descend onto it, and suck. The board is lifted and set
+upright, carried around the robot to a point in front of its target, and pressed against the studs
+until it is fixed.
 """
 
 from typing import NamedTuple
@@ -18,34 +18,35 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
-"""Offsets from the board's middle: of its face, and of the cups across and along it [m]."""
+"""Offsets of the board's face, and of the cups across and along it, from its centre [m]."""
 ABOVE_M, SUCK_M = 0.12, 0.05
 """Height at which the cups travel above the board, and distance below which they suck [m]."""
 OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.015, 0.05, 0.03, 0.2
-"""Errors below which the cups go down, and widths of a funnel above.
+"""Errors below which the cups descend, and widths of a funnel above these [m, rad].
 
-In the funnel the height grows with the error, so an imitating policy never hesitates at one height.
+Within the funnel, the height grows with the error, which keeps a policy that imitates this agent
+from hesitating at one height.
 """
 PRESS_M = 0.02
-"""Distance below the board's surface at which the cups aim [m]."""
+"""Depth below the board's surface to which the cups are commanded [m]."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
-"""Heights above the foot between which the board is set upright [m]."""
+"""Heights above the robot's base between which the board is set upright [m]."""
 NEAR_M, FAR_M = 0.72, 1.0
 """Distance of the board from the robot's axis when it is upright, and on the stack [m]."""
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
-"""Distance before its place at which the board is aligned, and errors of an aligned one."""
+"""Distance in front of its target at which the board is aligned, and maximum errors [m, rad]."""
 STAYS = 3.0
-"""Factor on these errors within which an aligned board stays so on the last part."""
+"""Factor on `ALIGNED_M` and `ALIGNED_RAD` below which a board remains aligned at the end."""
 THERE_M = np.array([0.003, 0.0, 0.003])
-"""Distance along each axis within which the board is held still, so that noise does not move it."""
+"""Errors along the axes below which the board is held still, to ignore noise [m]."""
 CORNER_M = 0.86
-"""Distance of the board's farthest corner from the middle of the cups [m]."""
+"""Distance of the board's farthest corner from the centre of the cups [m]."""
 LAST_RAD = 0.25
-"""Last angle of the path around the robot, on which the board moves straight."""
+"""Last angle of the path around the robot, within which the board moves straight [rad]."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
-"""Fastest motion with the board, fastest against the studs, and fastest turn."""
+"""Maximum speeds with the board and against the studs [m/s]; maximum turn rate [rad/s]."""
 STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)
-"""Directions of the stack and of the board's place around the robot."""
+"""Directions from the robot to the stack and to the board's target [rad]."""
 
 
 class ToolAxes(NamedTuple):
@@ -56,7 +57,7 @@ class ToolAxes(NamedTuple):
 
 
 class Fetch(NamedTuple):
-    """The motion towards the board."""
+    """The motion that fetches the board."""
 
     velocity: Array
     """Velocity of the tool (n, 3) [m/s]."""
@@ -66,7 +67,7 @@ class Fetch(NamedTuple):
 
 
 class Bring(NamedTuple):
-    """The motion with the board."""
+    """The motion while the board is held."""
 
     velocity: Array
     """Velocity of the tool (n, 3) [m/s]."""
@@ -79,20 +80,20 @@ class Plan(NamedTuple):
     velocity: Array
     """Velocity (n, 3) [m/s]."""
     turn: Array
-    """Turn rate (n, 3) [rad/s]."""
+    """Angular velocity (n, 3) [rad/s]."""
     sucks: NDArray[np.bool_]
     """Whether the cups suck (n,)."""
 
 
 class BoardHolder:
-    """Carries and holds the board by resolved rates, with or without yielding."""
+    """An agent that carries and holds the board and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:3, 3]
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A) towards the board, or with it to its place."""
+        """Return actions (..., A) that move to the board or carry it to its target."""
         terms = split(observation, self.env_info.layout)
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
@@ -157,7 +158,7 @@ class BoardHolder:
         return Bring(velocity, axes)
 
     def _carry(self, board: Array, angle: Array, height: Array, share: Array) -> Array:
-        """Return the velocity (n, 3) up and inward from the stack, then around the robot."""
+        """Return the velocity (n, 3) that lifts the board off the stack, then around the robot."""
         radius = np.linalg.norm(board[:, :2], axis=1)
         outward = board[:, :2] / np.maximum(radius, 1e-6)[:, None]
         aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
@@ -170,7 +171,7 @@ class BoardHolder:
 
 
 def _press(terms: dict[str, Array], to_place: Array) -> Array:
-    """Return the velocity (n, 3) to a point before the place, and against the studs if aligned."""
+    """Return the velocity (n, 3) to a point in front of the target, or to the studs if aligned."""
     aligned, before = _is_aligned(terms), to_place - [0.0, BEFORE_M, 0.0]
     left = np.sign(to_place) * np.maximum(np.abs(to_place) - THERE_M, 0.0)
     error = np.where(aligned[:, None], left, before)
@@ -180,7 +181,7 @@ def _press(terms: dict[str, Array], to_place: Array) -> Array:
 
 
 def _is_aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
-    """Return whether the board stands right before its place, or in it (n,)."""
+    """Return a mask (n,) of boards that are aligned in front of their target, or at it."""
     to_place, axes = terms["place_from_object"], terms["object_axes"]
     off = np.abs(to_place[:, [0, 2]]).max(1)
     askew = np.linalg.norm(np.cross(axes[:, 3:], [0.0, -1.0, 0.0]), axis=1)
@@ -191,7 +192,7 @@ def _is_aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
 
 
 def _is_pressing(terms: dict[str, Array]) -> NDArray[np.bool_]:
-    """Return whether the board is at its place, where people work and it must not move (n,)."""
+    """Return a mask (n,) of boards at their target, where people work and they must not move."""
     return (terms["object_held"][:, 0] > 0.5) & (
         np.linalg.norm(terms["place_from_object"], axis=1) < 0.02
     )

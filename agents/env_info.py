@@ -1,4 +1,4 @@
-"""The protocol of agents, and their knowledge of the environment."""
+"""The protocol of agents, and the information that they receive about an environment."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -27,21 +27,21 @@ class Agent(Protocol):
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return actions (..., A) in [-1, 1] for observations (..., n).
 
-        Observations are of one environment or of many; `EnvInfo.split` gives their terms.
+        Observations are of one environment or of many; `EnvInfo.split` returns their terms.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EnvInfo:
-    """The information that an agent gets in advance: the robot and the layout of observations."""
+    """Information that an agent receives in advance: the robot and the layout of observations."""
 
     layout: ObservationLayout
     """Entries of an observation by term, and their scales."""
     chain: SerialChain
-    """Kinematics of the robot, from its foot to its tool."""
+    """Kinematic chain of the robot, from its base to its tool."""
     home_q: NDArray[np.float64]
-    """Rest pose of the robot (N,) [rad], of slides [m]."""
+    """Rest configuration of the robot (N,) [rad; slides: m]."""
     control: str
     """Meaning of an action: "joint", "tool" or "twist"."""
     control_config: ControlConfig
@@ -51,19 +51,19 @@ class EnvInfo:
     task: str
     """Id of the task."""
     map: Grounds
-    """Map of the place: obstacles, and areas where people walk and work."""
+    """Map of the scene: obstacles, and areas where people walk and work."""
     goal_size: int = 0
-    """Number of entries of a goal that is separate from the observation; 0: there is none."""
+    """Number of entries of a goal that is separate from the observation; 0 if there is none."""
     images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     """Height, width and channels of images beside the observation, by name."""
 
     def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
         """Return the terms of an observation by name, in metres, seconds and radians.
 
-        Goals and images are among them.
+        Goals and images are included.
 
         Args:
-            observation: (..., n), or arrays by name.
+            observation: array (..., n), or arrays by name.
         """
         return split(observation, self.layout)
 
@@ -73,13 +73,13 @@ AgentFactory = Callable[[EnvInfo], Agent]
 
 
 def env_info(env: object) -> EnvInfo:
-    """Return the information that an agent gets about an environment in advance.
+    """Return the information that an agent receives in advance about an environment.
 
     Args:
         env: a single or vector environment of this package, wrapped or not, or its simulation.
 
     Raises:
-        ConfigError: it is none of these.
+        ConfigError: `env` is none of these.
     """
     inner = getattr(env, "unwrapped", env)
     simulation = cast("Simulation", getattr(inner, "simulation", inner))

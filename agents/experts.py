@@ -18,16 +18,16 @@ from .scripted import Reacher, Yielding
 
 Terms = dict[str, NDArray[np.float64]]
 PLACED_M = 0.008
-"""Distance to its place within which a released piece stays there [m]."""
+"""Distance from its target within which a released piece counts as placed [m]."""
 
 
 def read_reach_goal(terms: Terms) -> Terms:
-    """Return the terms that `Reacher` needs, from goals."""
+    """Compute the terms that `Reacher` needs from the achieved and desired goals."""
     return {"goal_from_tool": terms["desired_goal"] - terms["achieved_goal"]}
 
 
 def read_pick_place_goal(terms: Terms) -> Terms:
-    """Return the terms that `PickPlacer` needs, from goals."""
+    """Compute the terms that `PickPlacer` needs from the achieved and desired goals."""
     way = terms["desired_goal"] - terms["achieved_goal"]
     off_m = np.linalg.norm(way.reshape(*way.shape[:-1], -1, 3), axis=-1)
     placed = (off_m < PLACED_M) & (terms["object_held"] < 0.5)
@@ -35,13 +35,13 @@ def read_pick_place_goal(terms: Terms) -> Terms:
 
 
 class GoalReader:
-    """An expert for tasks with goals that are separate from the observation."""
+    """A scripted agent for tasks with goals that are separate from the observation."""
 
     def __init__(self, expert: Reacher | PickPlacer, read: Callable[[Terms], Terms]) -> None:
         self.expert, self.read = expert, read
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A), as the expert's."""
+        """Return the actions (..., A) of the expert."""
         terms = split(observation, self.expert.env_info.layout)
         return self.expert.act_on({**terms, **self.read(terms)})
 
@@ -62,8 +62,8 @@ def make_expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
     """Return the scripted agent for a task, or for the task that it derives from.
 
     Args:
-        env_info: the environment.
-        yielding: how it slows down near people; None: it ignores them.
+        env_info: information about the environment.
+        yielding: parameters of slowing down near people; None to ignore them.
 
     Raises:
         ConfigError: there is no scripted agent for the task.

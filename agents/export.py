@@ -35,20 +35,20 @@ with learner():
     from stable_baselines3 import SAC
 
 LEFT_OUT = {*ONLY_OF_A_RUN} - {"timesteps", "engine", "workers"}
-"""Arguments that a policy does not depend on."""
+"""Arguments of a run on which the policy does not depend."""
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
 """Names of activation functions."""
 
 
 class ExportedNetwork(NamedTuple):
-    """The network of a policy."""
+    """Weights and structure of a policy's network."""
 
     tensors: Tensors
     architecture: Architecture
 
 
 def run(request: ExportRequest) -> int:
-    """Write weights and card; return the exit status.
+    """Export the policy of a run as weights and a card; return the exit status.
 
     Raises:
         CheckpointError: the folder holds no run, or the policy exists already.
@@ -87,10 +87,10 @@ def run(request: ExportRequest) -> int:
 
 
 def extract_network(trained: checkpoints.Learner) -> ExportedNetwork:
-    """Return the network of a learner that acts.
+    """Return the network of a learner that computes actions.
 
     Raises:
-        CheckpointError: it uses images, and the format has no convolutions.
+        CheckpointError: the network uses images; the format has no convolutions.
     """
     space = trained.observation_space
     if isinstance(space, spaces.Dict) and any(name.startswith(IMAGE) for name in space.spaces):
@@ -140,7 +140,7 @@ def _evaluate(
     kwargs: Mapping[str, Any],
     console: Console,
 ) -> Worth:
-    """Evaluate a policy on the seeds of evaluations, and print the scores."""
+    """Evaluate a policy on the fixed evaluation seeds, and print its scores."""
     with progress_bar(console, f"evaluating, shield {shield}") as say:
         episodes = play_episodes(
             lambda _: network, request.episodes, tick=lambda share: say(share, ""),

@@ -1,4 +1,4 @@
-"""Features of observations for policies: every entry at two scales."""
+"""Features of observations for policies, with every entry at two scales."""
 
 import math
 from typing import Any
@@ -17,11 +17,11 @@ with learner():
 
 
 class NearAndFar(BaseFeaturesExtractor):
-    """Features that hold every entry x and also sign(x) log(1 + NEAR |x|).
+    """Feature extractor that returns each entry x and sign(x) log(1 + NEAR |x|) / log(1 + NEAR).
 
-    A network that sees metres and must place to millimetres has both at their own scale. Parts of
-    an observation are used in their order; if goals are separate, the difference between desired
-    and achieved goal is one more part.
+    The features let a network with inputs in metres place objects to millimetres. Parts of an
+    observation are concatenated in their order; if goals are separate, the difference between
+    desired and achieved goal is appended.
     """
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:

@@ -1,7 +1,7 @@
-"""A tool bringer without learning, which decides from the observation alone.
+"""Scripted handover of a tool, decided from the observation alone.
 
-The fingers move before the tool, to it, close, and lift it. They bring its handle to the estimated
-position of a worker's hand, wait until it is taken, open and retreat.
+The fingers move in front of the tool, approach it, close, and lift it. They bring its handle to the
+estimated position of a worker's hand, wait until the worker takes it, open and retreat.
 """
 
 from typing import NamedTuple
@@ -18,30 +18,30 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 GRIP_UP_M, HANDLE_UP_M, HAND_M = -0.08, 0.12, 0.09
-"""Heights of grip and handle above the tool's middle; distance of a hand beyond its wrist [m]."""
+"""Heights of grip and handle above the tool's centre; distance of a hand beyond its wrist [m]."""
 BEFORE_M, LEVEL_M, AT_M, STILL_AT_M = 0.12, 0.008, 0.010, 0.018
-"""Distance before the tool at which the fingers become level; errors of level, of closing, of
-staying closed [m]."""
+"""Distance in front of the tool at which the fingers align; errors below which they are aligned,
+close, and stay closed [m]."""
 TOOL_M = 0.20
 """Distance of the tool's farthest end from the fingers [m]."""
 STAND_M, LIFTED_M = (0.30, -0.62, 0.10), 0.08
-"""Position of the tool on its stand, from the robot's foot; height above it before it may move
-sideways [m]."""
+"""Position of the tool on its stand, relative to the robot's base; height above it from which the
+tool may move sideways [m]."""
 ROUND_M = 0.58
 """Radius of the circle around the robot on which the fingers travel [m]."""
 TURN_RAD_S, FAST_M_S, BRING_M_S, OFFER_M_S = 1.1, 0.5, 0.35, 0.15
-"""Fastest turn, fastest motion without the tool, with it, and close to the hand."""
+"""Maximum turn rate; maximum speeds without the tool, with it, and close to the hand."""
 OFFERED_M = 0.05
-"""Distance to the estimated hand below which the handle is held still: the hand comes to it."""
+"""Distance to the estimated hand below which the handle is held still for the worker [m]."""
 NEAR_M, REACH_M, HIGH_M = 0.35, 1.0, 0.15
-"""Distance from the hand below which the handle moves slowly; greatest distance of hands from the
-robot's axis, and their least height above its foot [m]."""
+"""Distance to the hand below which the handle moves slowly; maximum distance of hands from the
+robot's axis, and their minimum height above its base [m]."""
 WAIT_M, BACK_M = (0.58, 0.0, 0.30), 0.30
-"""Position of the tool while it waits for a hand, from the foot; length of the retreat [m]."""
+"""Waiting position of the tool relative to the robot's base; length of the retreat [m]."""
 
 
 class Fetch(NamedTuple):
-    """The motion towards the tool."""
+    """The motion that fetches the tool."""
 
     velocity: Array
     """Velocity of the fingers (n, 3) [m/s]."""
@@ -52,7 +52,7 @@ class Fetch(NamedTuple):
 
 
 class Bring(NamedTuple):
-    """The motion with the tool."""
+    """The motion while the tool is held."""
 
     velocity: Array
     """Velocity of the fingers (n, 3) [m/s]."""
@@ -64,20 +64,20 @@ class Hand(NamedTuple):
     """The nearest hand that is held out."""
 
     position: Array
-    """Position from the robot's foot (n, 3) [m]."""
+    """Position relative to the robot's base (n, 3) [m]."""
     is_out: NDArray[np.bool_]
-    """Whether there is one (n,)."""
+    """Whether a hand is held out (n,)."""
 
 
 class Bringer:
-    """Brings the tool by resolved rates, with or without yielding."""
+    """An agent that brings the tool by resolved-rate control and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:3, 3]
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A) towards the tool, with it to the hand, and away from it."""
+        """Return actions (..., A) that fetch the tool, bring it to the hand, and retreat."""
         terms = split(observation, self.env_info.layout)
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
@@ -147,7 +147,7 @@ class Bringer:
         return Hand(hands[np.arange(n), nearest], out.any(1))
 
     def _leave(self, terms: dict[str, Array], held: NDArray[np.bool_]) -> Array:
-        """Return the velocity (n, 3) back from the tool while the fingers are open."""
+        """Return the velocity (n, 3) of the retreat from the tool, once the fingers are open."""
         back = -terms["tool_axes"][:, 3:] * 0.2
         near = np.linalg.norm(terms["object_from_tool"], axis=1) < BACK_M
         opened = terms["hand_opening"][:, 0] > 0.025
@@ -160,11 +160,11 @@ def _approach(way: Array, most_m_s: float) -> Array:
 
 
 def _flatten(way: Array) -> Array:
-    """Return the horizontal unit vectors of vectors (n, 3)."""
+    """Return the horizontal unit vectors (n, 3) in the directions of vectors (n, 3)."""
     level = way * [1.0, 1.0, 0.0]
     return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
 
 
 def _rotate_left(heading: Array) -> Array:
-    """Return horizontal vectors (n, 3) to the left of horizontal ones."""
+    """Return horizontal vectors (n, 3), rotated by 90 degrees to the left."""
     return np.stack([-heading[:, 1], heading[:, 0], np.zeros(len(heading))], axis=1)

@@ -1,4 +1,4 @@
-"""Learning recipes of tasks and settings of learners, which can be read without a learner."""
+"""Training recipes of tasks, and settings of learners; importing them needs no learner."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -12,9 +12,9 @@ from hrc_env.core.mapping import answer_unknown_fields
 class PPOSettings:
     """Settings of PPO for the built-in tasks: keywords of `stable_baselines3.PPO`.
 
-    They assume episodes out of phase, scaled rewards (observations are scaled already), and a
-    proximity term that grows: with the whole term from the first step a learner learns to stay away
-    before it finds a goal. `train` provides all three:
+    They assume environments in different phases of their episodes, scaled rewards (observations are
+    scaled already), and a growing proximity term: with its full weight from the first step, a
+    learner learns to stay away from people before it finds a goal. `train` provides all three:
 
         env = VecNormalize(HRCVecEnv(64, stagger=True), norm_obs=False, gamma=0.98)
         model = PPO("MlpPolicy", env, **PPOSettings().keywords())
@@ -32,18 +32,18 @@ class PPOSettings:
     gamma: float = 0.98
     """Discount per step; 0.98 is a horizon of about 2 s."""
     gae_lambda: float = 0.95
-    """Trade-off between bias and variance of the advantage."""
+    """Lambda of generalized advantage estimation, which trades bias for variance."""
     clip_range: float = 0.2
-    """Greatest relative change of the policy in an update."""
+    """Clipping range of the probability ratio of new and old policy."""
     hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of policy and value network (tanh)."""
     log_std_init: float = -0.5
     """Initial log standard deviation of actions."""
     near_and_far: bool = False
-    """Whether every entry is used at two scales (`agents.features`), with ReLU layers."""
+    """Whether each entry of an observation is used at two scales (`agents.features`), with ReLU."""
 
     def keywords(self) -> dict[str, Any]:
-        """Return the keyword arguments of `stable_baselines3.PPO`; torch is imported here."""
+        """Return keyword arguments for `stable_baselines3.PPO`; this imports torch."""
         import torch
 
         values = asdict(self)
@@ -77,23 +77,24 @@ class SACSettings:
     gamma: float = 0.95
     """Discount per step; 0.95 is a horizon of about 1 s."""
     tau: float = 0.05
-    """Share by which the target networks follow in a gradient step."""
+    """Share by which the target networks follow the critics in a gradient step."""
     ent_coef: str = "auto_0.05"
-    """Weight of the entropy: adapted during the training, from this value on."""
+    """Weight of the entropy; "auto_0.05" adapts it during training, starting from 0.05."""
     hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of actor and critics (ReLU)."""
     near_and_far: bool = True
-    """Whether every entry and the difference to the goal are used at two scales
+    """Whether each entry of an observation, and the difference to the goal, is used at two scales
     (`agents.features`).
 
-    Without it, hindsight found no goal of reaching in 5,000 gradient steps; with it, in 800.
+    With hindsight replay, the reaching task was learnt in 800 gradient steps; without these
+    features, no goal was found in 5,000.
     """
     relabelled: int = 4
-    """With hindsight, number of transitions relabelled with goals achieved later in their episode,
-    for each with its own goal."""
+    """With hindsight replay, number of transitions relabelled with goals achieved later in their
+    episode, per transition with its original goal."""
 
     def keywords(self) -> dict[str, Any]:
-        """Return the keyword arguments of `stable_baselines3.SAC`; torch is imported here."""
+        """Return keyword arguments for `stable_baselines3.SAC`; this imports torch."""
         values = asdict(self)
         del values["relabelled"]
         hidden = list(values.pop("hidden"))
@@ -113,8 +114,8 @@ IMITATOR = PPOSettings(hidden=(256, 256), near_and_far=True, learning_rate=5e-5,
 """Settings of PPO after cloning, which preserve most of the cloned behaviour."""
 
 IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 0}
-"""Recipe of tasks that PPO alone does not learn; training after cloning did not improve picking and
-delivering."""
+"""Recipe of tasks that PPO alone does not learn. Training after cloning did not improve picking
+and delivering."""
 RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
     "HRCPickPlace-v0": {**IMITATION, "demonstrations": 512},
@@ -125,6 +126,6 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
 }
 """Default recipe of each task: arguments of `python -m hrc_env train` by the task's id.
 
-Other tasks use PPO, control "joint", no demonstrations and 1,000,000 steps. The learners' own
-settings are `PPOSettings` and `SACSettings`.
+Other tasks use PPO, control "joint", no demonstrations and 1,000,000 steps. The settings of the
+learners are `PPOSettings` and `SACSettings`.
 """

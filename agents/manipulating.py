@@ -1,4 +1,4 @@
-"""Functions of scripted agents that manipulate: from targets of the tool to actions."""
+"""Functions of scripted manipulation, from targets of the tool to actions."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,22 +9,22 @@ from .env_info import EnvInfo
 
 Array = NDArray[np.float64]
 ROUND_RAD = 0.35
-"""Angle around the robot beyond which a target is approached along a circle."""
+"""Angle around the robot beyond which a target is approached along a circle [rad]."""
 TURN_HZ = 4.0
-"""Turn rate per angle [1/s]."""
+"""Gain of turns: turn rate per angle [1/s]."""
 
 
 def plan_around_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float) -> Array:
-    """Return paths to targets: along a circle around the robot if they are far around it.
+    """Return displacements to targets, along a circle if they are far around the robot.
 
     Args:
         tool: position of the tool (n, 3) [m].
-        target: targets from the tool (n, 3) [m].
+        target: positions of targets relative to the tool (n, 3) [m].
         foot_xy: horizontal position of the robot's axis (2,) [m].
-        radius_m: greatest radius of the circle [m].
+        radius_m: maximum radius of the circle [m].
 
     Returns:
-        Paths from the tool (n, 3) [m], straight for other targets.
+        Displacements of the tool (n, 3) [m]; those to other targets are straight.
     """
     here, there = tool[:, :2] - foot_xy, tool[:, :2] + target[:, :2] - foot_xy
     radius, wanted = np.linalg.norm(here, axis=1), np.linalg.norm(there, axis=1)
@@ -39,13 +39,13 @@ def plan_around_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float
 
 
 def turn_towards(tool_axes: Array, x: Array, z: Array, most_rad_s: float) -> Array:
-    """Return turn rates (n, 3) that turn the tool towards desired axes.
+    """Return angular velocities (n, 3) [rad/s] that turn the tool towards desired axes.
 
     Args:
-        tool_axes: axes x and z of the tool (n, 6).
+        tool_axes: current x and z axes of the tool (n, 6).
         x: desired x axis (n, 3).
         z: desired z axis (n, 3).
-        most_rad_s: fastest turn [rad/s].
+        most_rad_s: maximum angular speed [rad/s].
     """
     own_x, own_z = tool_axes[:, :3], tool_axes[:, 3:]
     own_y, y = np.cross(own_z, own_x), np.cross(z, x)
@@ -58,13 +58,13 @@ def turn_towards(tool_axes: Array, x: Array, z: Array, most_rad_s: float) -> Arr
 def make_arm_action(
     env_info: EnvInfo, terms: dict[str, Array], velocity: Array, turn: Array
 ) -> Array:
-    """Return the arm's part of an action (n, A - 1) for a motion of the tool.
+    """Return the arm's part (n, A - 1) of actions for a motion of the tool.
 
     Args:
-        env_info: the environment.
-        terms: terms of the observation.
+        env_info: information about the environment.
+        terms: terms of the observation, by name.
         velocity: velocity of the tool (n, 3) [m/s].
-        turn: turn rate of the tool (n, 3) [rad/s].
+        turn: angular velocity of the tool (n, 3) [rad/s].
     """
     config, twist = env_info.control_config, np.concatenate([velocity, turn], axis=1)
     if env_info.control == "twist":

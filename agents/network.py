@@ -1,4 +1,4 @@
-"""The mean action of a trained policy by NumPy alone, so that acting needs no learner."""
+"""Networks of trained policies in NumPy, for acting without a learner."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from hrc_env.tasks.goal import ACHIEVED, DESIRED
 from .env_info import Observation
 
 NEAR = 100.0
-"""Factor of the near scale: entries below 1 / NEAR are spread out."""
+"""Factor of the near scale, which spreads out entries below 1 / NEAR."""
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 """Activation functions by name."""
 Tensors = dict[str, NDArray[np.float32]]
@@ -29,9 +29,9 @@ class Architecture:
     activation: str
     """Activation after each layer but the last: "tanh" or "relu"."""
     near_and_far: bool
-    """Whether every entry is used at two scales (`agents.features`)."""
+    """Whether each entry of an observation is used at two scales (`agents.features`)."""
     squashed: bool
-    """Whether actions are the tanh of the last layer's output (SAC), not clipped at -1 and 1
+    """Whether the last layer's output is squashed by tanh (SAC) instead of clipped to [-1, 1]
     (PPO)."""
 
     def __post_init__(self) -> None:
@@ -46,7 +46,7 @@ class NetworkSizes(NamedTuple):
 
 
 class Network:
-    """A sequence of layers; layer k is "actor.k.weight" (out, in) and "actor.k.bias" (out,).
+    """A sequence of layers; layer k has "actor.k.weight" (out, in) and "actor.k.bias" (out,).
 
     Raises:
         KeyError: a layer lacks its weight or bias.
@@ -59,7 +59,7 @@ class Network:
 
     @property
     def sizes(self) -> NetworkSizes:
-        """Numbers of its inputs and outputs."""
+        """Numbers of inputs and outputs."""
         n_features = self.layers[0][0].shape[1]
         n_inputs = n_features // (2 if self.architecture.near_and_far else 1)
         return NetworkSizes(n_inputs, len(self.layers[-1][1]))

@@ -1,8 +1,8 @@
-"""A picker without learning, which decides from the observation alone.
+"""Scripted picking and placing, decided from the observation alone.
 
-It needs no memory. With a piece in the fingers it moves up, around the robot to above its place,
-down, and opens; without one, the fingers move above the first piece that is not placed, down, and
-close. Velocities of the tool are resolved to joint velocities by `hrc_env.control`.
+The agent needs no memory. If the fingers hold a piece, they move up, around the robot to a point
+above its target, down, and open. Otherwise, they move above the first piece that is not placed,
+down, and close. `hrc_env.control` converts velocities of the tool to joint velocities.
 """
 
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 ABOVE_M, CLEAR_M = 0.16, 0.11
-"""Height at which the tool travels above pieces, and least height of sideways motion [m]."""
+"""Height at which the tool travels above pieces, and minimum height of sideways motion [m]."""
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
-"""Horizontal errors below which the tool goes down, and below which it continues to."""
+"""Errors below which the tool starts to descend [m, rad], and below which it continues [m]."""
 AT_M, STILL_AT_M = 0.007, 0.014
-"""Distances to a piece's middle below which fingers close, and stay closed [m].
+"""Distances to a piece's centre below which the fingers close, and stay closed [m].
 
-At these distances to its place they open.
+At these distances of the piece from its target, they open, and stay open.
 """
 PIECE_M = 0.15
 """Distance of a piece's end from the fingers [m]."""
@@ -34,7 +34,7 @@ LYING = 0.8
 ROUND_M = 0.50
 """Radius of the circle around the robot on which the tool travels [m].
 
-It leaves the space in front to people.
+It leaves the space in front of the robot to people.
 """
 
 
@@ -51,11 +51,11 @@ class _View:
     opening_m: Array
     """Opening of the fingers (n,) [m]."""
     to_piece: Array
-    """The first piece to place, from the tool (n, 3) [m]."""
+    """Position of the first piece to place, relative to the tool (n, 3) [m]."""
     along: Array
     """Long axis of the piece (n, 3)."""
     to_place: Array
-    """Place of the piece, from the piece (n, 3) [m]."""
+    """Target of the piece, relative to the piece (n, 3) [m]."""
     held: NDArray[np.bool_]
     """Whether the piece is held (n,)."""
     nothing: NDArray[np.bool_]
@@ -68,24 +68,24 @@ class _Plan(NamedTuple):
     velocity: Array
     """Velocity (n, 3) [m/s]."""
     turn: Array
-    """Turn rate (n, 3) [rad/s]."""
+    """Angular velocity (n, 3) [rad/s]."""
     grip: Array
     """Command of the fingers (n,): 1 closes, -1 opens."""
 
 
 class PickPlacer:
-    """Picks and places by resolved rates, with or without yielding."""
+    """An agent that picks and places by resolved-rate control and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:2, 3]
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A) towards the next piece, or with it to its place."""
+        """Return actions (..., A) that move to the next piece or carry it to its target."""
         return self.act_on(split(observation, self.env_info.layout))
 
     def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
-        """Return actions for an observation that is given by its terms."""
+        """Return actions (..., A) for the terms of an observation (`EnvInfo.split`)."""
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         velocity, turn, grip = self._plan(_read_view(terms))
@@ -124,7 +124,7 @@ class PickPlacer:
         return _Plan(velocity, turn, 2.0 * closed - 1)
 
     def _compute_velocity(self, tool: Array, target: Array) -> Array:
-        """Return velocities (n, 3) to targets from the tool."""
+        """Return velocities (n, 3) of the tool to targets that are relative to it."""
         error = plan_around_foot(tool, target, self._foot, ROUND_M)
         length = np.linalg.norm(error, axis=1, keepdims=True)
         most = self.env_info.control_config.tool_speed_m_s
@@ -132,7 +132,7 @@ class PickPlacer:
 
 
 def _read_view(terms: dict[str, Array]) -> _View:
-    """Return the parts of observations for the first piece that can be placed and is not."""
+    """Return the parts of observations about the first piece that remains to be placed."""
     n = len(terms["object_placed"])
     axes = terms["object_axes"].reshape(n, -1, 2, 3)
     to_place = terms["place_from_object"].reshape(n, -1, 3)
@@ -156,13 +156,13 @@ def _read_view(terms: dict[str, Array]) -> _View:
 
 
 def _find_finger_turn(finger_axis: Array, along: Array) -> Array:
-    """Return angles (n,) that turn fingers across a piece, -90 to 90 degrees."""
+    """Return angles (n,) from -pi/2 to pi/2 that turn the fingers across a piece."""
     across = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
     return _wrap_half_turn(across - np.arctan2(finger_axis[:, 1], finger_axis[:, 0]))
 
 
 def _find_turn_to_y(along: Array) -> Array:
-    """Return angles (n,) that turn a piece along y, in either direction."""
+    """Return angles (n,) from -pi/2 to pi/2 that turn a piece parallel to the y axis."""
     return _wrap_half_turn(np.pi / 2 - np.arctan2(along[:, 1], along[:, 0]))
 
 

@@ -1,8 +1,8 @@
 """Trained policies as files that execute no code: weights as safetensors, and a card beside them.
 
-`hrc://HRCReach-v0/NAME` is a policy of the package; NAME.safetensors is any other that `python -m
-hrc_env export` wrote. The card (NAME.json) describes its environment, its training and its scores;
-the card's SHA-256 guards the weights.
+`hrc://HRCReach-v0/NAME` is a policy of the package; NAME.safetensors is a policy that `python -m
+hrc_env export` wrote. The card (NAME.json) describes its environment, its training and its scores,
+and holds the SHA-256 digest of the weights, which is checked when they are loaded.
 """
 
 import hashlib
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from hrc_env.core.errors import CheckpointError, ConfigError, unknown
+from hrc_env.core.errors import CheckpointError, ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.results import Metric
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
@@ -28,19 +28,19 @@ EXPORT = "python -m hrc_env export RUN --name NAME"
 
 @dataclass(frozen=True, slots=True)
 class TermSize:
-    """The size of a term of the observation."""
+    """Name, size and scale of a term of the observation."""
 
     name: str
     """Name of the term."""
     entries: int
     """Number of entries."""
     scale: float
-    """Value to which one unit corresponds."""
+    """Physical value that corresponds to 1 in the observation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Worth:
-    """Means over episodes on fixed seeds with deterministic actions, and their 95 % intervals."""
+    """Mean scores of a policy with 95 % intervals, on fixed seeds with deterministic actions."""
 
     shield: str
     """Name of the shield, or "none"."""
@@ -60,7 +60,7 @@ class Card:
     task: str
     """Id of the environment."""
     control: str
-    """Control of the actions."""
+    """Meaning of actions: "joint", "tool" or "twist"."""
     observation: tuple[TermSize, ...]
     """Terms of the observation in their order."""
     n_actions: int
@@ -76,29 +76,29 @@ class Card:
     hrc_env: str
     """Version of the package."""
     commit: str | None
-    """Commit of the repository."""
+    """Git commit of the training, or None if it is unknown."""
     sha256: str
-    """Digest of the weights' file."""
+    """SHA-256 digest of the file of weights."""
     worth: tuple[Worth, ...]
-    """Scores at the time of the export."""
+    """Scores at the time of the export, one for each shield."""
 
 
 class Policy(NamedTuple):
-    """A policy from its files."""
+    """A policy's card and network, as read from their files."""
 
     card: Card
     network: Network
 
 
 def list_names() -> tuple[str, ...]:
-    """Return the addresses of the package's policies."""
+    """Return the names ("hrc://...") of the package's policies."""
     return tuple(
         f"{PREFIX}{path.parent.name}/{path.stem}" for path in sorted(FOLDER.glob(f"*/*{SUFFIX}"))
     )
 
 
 def find_path(policy: str) -> Path:
-    """Return the file of a policy, given by its address or its path.
+    """Return the path of the policy with an "hrc://" name; a path is returned unchanged.
 
     Raises:
         ConfigError: the package has no such policy.
@@ -107,17 +107,21 @@ def find_path(policy: str) -> Path:
         return Path(policy)
     if policy not in list_names():
         names = list_names()
-        error = unknown("policy", policy, names) if names else "The package has no policies yet."
+        error = (
+            make_unknown_name_error("policy", policy, names)
+            if names
+            else "The package has no policies yet."
+        )
         raise ConfigError(f"{error} Or train your own, and: {EXPORT}")
     return FOLDER / f"{policy.removeprefix(PREFIX)}{SUFFIX}"
 
 
 def read(path: Path) -> Policy:
-    """Return a policy with its card.
+    """Read a policy and its card from their files.
 
     Raises:
-        CheckpointError: a file is missing, the card is not a card, the weights are not those of
-            the card, or they are not safetensors.
+        CheckpointError: a file is missing, the card is invalid, the weights do not match the
+            card's digest, or they are not safetensors.
     """
     card_path = path.with_suffix(".json")
     for file in (path, card_path):
@@ -143,10 +147,10 @@ def read(path: Path) -> Policy:
 
 
 def load(path: Path, env_info: EnvInfo) -> Network:
-    """Return a policy for acting in an environment.
+    """Load the network of a policy for acting in an environment.
 
     Raises:
-        CheckpointError: it fails in `read`, or it was made for another environment.
+        CheckpointError: the files are invalid (`read`), or the policy is for another environment.
     """
     card, network = read(path)
     different = list_differences(card, env_info)
@@ -159,7 +163,7 @@ def load(path: Path, env_info: EnvInfo) -> Network:
 
 
 def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
-    """Return descriptions of the differences between a policy's environment and another one."""
+    """Describe each difference between a policy's training environment and another one."""
     texts = [
         f"its {name} is {theirs}, here it is {ours}"
         for name, theirs, ours in (

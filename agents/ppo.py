@@ -1,8 +1,8 @@
 """Proximal policy optimization by Stable-Baselines3, with settings for these tasks.
 
-Schulman et al. 2017, arXiv:1707.06347. Most important were: no running normalization of
-observations (it inflates nearly constant ones such as ages), a progress term, and many short
-rollouts at random phases of an episode.
+Schulman et al. 2017, arXiv:1707.06347. The most important choices are to use no running
+normalization of observations (it inflates nearly constant ones such as ages), a progress term in
+the reward, and many short rollouts at random phases of an episode.
 """
 
 from collections.abc import Callable
@@ -27,9 +27,9 @@ def make_learner(
     tensorboard: Path | None = None,
     kind: Callable[..., PPO] = PPO,
 ) -> PPO:
-    """Return a new PPO on `env`.
+    """Return a new PPO learner for `env`.
 
-    Rewards are scaled by a running estimate; observations stay as they are.
+    Rewards are scaled by a running estimate; observations are not changed.
     """
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     log = None if tensorboard is None else str(tensorboard)

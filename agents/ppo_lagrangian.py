@@ -1,8 +1,8 @@
-"""PPO with a cost limit: Stable-Baselines3's PPO with another collection of rollouts.
+"""PPO with a cost limit, by Stable-Baselines3's PPO with a modified collection of rollouts.
 
 A multiplier weighs the advantage of the cost against that of the reward (Ray et al. 2019,
-"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It follows the error by
-proportional and integral terms (Stooke et al. 2020, arXiv:2007.03964). Costs are those of
+"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It is controlled by proportional
+and integral terms of the error (Stooke et al. 2020, arXiv:2007.03964). Costs are those of
 `info["cost"]`, which are computed from the truth.
 """
 
@@ -31,11 +31,12 @@ CRITIC_RATE, CRITIC_PASSES, CRITIC_BATCH = 1e-3, 4, 1024
 
 @dataclass(slots=True)
 class Multiplier:
-    """Compute lambda = clip(integral + kp error) after each rollout.
+    """The multiplier lambda = clip(integral + kp error), updated after each rollout.
 
-    The integral changes by a share of itself, so it finds lambdas of any size, and leaves large
-    ones as fast as it reached them. It rests while lambda is at a bound that the error would
-    exceed, and the error is at most 1: policies take hundreds of rollouts to follow.
+    The integral changes in proportion to 1 + its value, which reaches lambdas of any size, and
+    reduces large ones as fast as it reached them. It does not change while lambda is at a bound
+    that the error would exceed. The error is limited to 1, since policies take hundreds of rollouts
+    to follow.
     """
 
     limit: float
@@ -45,9 +46,9 @@ class Multiplier:
     ki: float = 0.02
     """Gain of the integral term."""
     smoothing: float = 0.1
-    """Share by which `cost` follows the latest rollout."""
+    """Weight of the latest rollout in the smoothed `cost`."""
     most: float = 20.0
-    """Greatest lambda."""
+    """Maximum of lambda."""
     cost: float = float("nan")
     """Smoothed cost of an episode."""
     integral: float = 0.0
@@ -63,7 +64,7 @@ class Multiplier:
 
         Args:
             cost: cost of an episode in the rollout.
-            share: the limit in force is limit / share.
+            share: share by which the limit is divided, which makes it wider.
         """
         new = 1.0 if np.isnan(self.cost) else self.smoothing
         self.cost = cost if new == 1.0 else (1 - new) * self.cost + new * cost
@@ -78,12 +79,12 @@ class Multiplier:
 class PPOLagrangian(PPO):
     """PPO with the advantages (A_reward - lambda A_cost) / (1 + lambda), each normalized.
 
-    The cost has its own critic. Its targets are in units of the running deviation of the discounted
-    cost, as it would not reach raw ones of 15 to 50.
+    A separate critic predicts the cost. Its targets are divided by the running standard deviation
+    of the discounted cost, since it would not reach raw ones of 15 to 50.
 
     Args:
         limit: limit of the cost of an episode.
-        episode_steps: length of an episode; the cost of a rollout is counted per step.
+        episode_steps: length of an episode, by which the mean cost of a step is multiplied.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class PPOLagrangian(PPO):
     ) -> None:
         self.multiplier, self.episode_steps = Multiplier(limit), episode_steps
         self.share = 1.0
-        """The limit in force is limit / share: with a wide limit the task is learnt first."""
+        """Share by which the limit is divided; with a wide limit, the task is learnt first."""
         self.spread, self.discounted = RunningMeanStd(), np.zeros(1)
         super().__init__(*args, **kwargs)
 
@@ -118,9 +119,9 @@ class PPOLagrangian(PPO):
         rollout_buffer: RolloutBuffer,
         n_rollout_steps: int,
     ) -> bool:
-        """Collect a rollout as PPO does, then update the multiplier and the critic of costs.
+        """Collect a rollout as PPO does, then update the multiplier and the cost critic.
 
-        The cost is included in the advantages.
+        The advantages in the buffer then include the cost.
         """
         self._costs: list[Floats] = []
         self._beyond: list[Floats] = []
@@ -142,7 +143,7 @@ class PPOLagrangian(PPO):
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: Any = None) -> None:
         """Store the costs of a step, and the critic's value beyond a time limit.
 
-        It is called in every step.
+        Stable-Baselines3 calls it in every step.
         """
         super()._update_info_buffer(infos, dones)
         beyond = np.zeros(len(infos))
@@ -193,7 +194,7 @@ class PPOLagrangian(PPO):
 
 
 def _flatten(observations: Any) -> Any:
-    """Return observations (T, E, n) as (T E, n), also by name."""
+    """Reshape observations (T, E, n), or arrays by name, to (T E, n)."""
     if isinstance(observations, dict):
         return {name: _flatten(part) for name, part in observations.items()}
     return torch.as_tensor(observations.reshape(-1, observations.shape[-1]))

@@ -11,7 +11,7 @@ from .env_info import EnvInfo, Observation
 
 
 class RandomAgent:
-    """Draws every action from its own generator."""
+    """An agent that draws uniformly random actions from a generator of its own."""
 
     def __init__(self, env_info: EnvInfo, seed: int = 0) -> None:
         self.n_actions = env_info.n_actions

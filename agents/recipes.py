@@ -10,7 +10,7 @@ from .requests import TrainingRequest
 
 @dataclass(frozen=True, kw_only=True)
 class Run(TrainingRequest):
-    """Training arguments without open ones; defaults suit most tasks."""
+    """Complete training arguments, with defaults that suit most tasks."""
 
     algorithm: str = "ppo"
     control: str = "joint"
@@ -20,11 +20,11 @@ class Run(TrainingRequest):
 
 
 LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}
-"""Recipe with a cost limit, without a proximity term."""
+"""Recipe for training with a cost limit, which replaces the proximity term."""
 
 
 def fill_in(arguments: TrainingRequest) -> Run:
-    """Return the arguments, with the recipe of their task for those that are not given."""
+    """Return the arguments, with those that are None replaced by the recipe of their task."""
     recipe = RECIPES.get(arguments.task, {})
     if arguments.algorithm == "ppo_lagrangian":
         recipe = {**(recipe if recipe.get("algorithm", "ppo") == "ppo" else {}), **LIMITED}

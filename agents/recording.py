@@ -1,7 +1,7 @@
 """Recording of an agent's episodes as a data set of Minari (https://minari.farama.org) or a folder.
 
-Finished episodes are stored in a folder beside the data set, which is made from them at the end, at
-once.
+Finished episodes are stored in a draft folder beside the data set. At the end, they become the data
+set in a single step.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from hrc_env.core.errors import ConfigError, MissingExtraError
-from hrc_env.core.infos import matching
+from hrc_env.core.infos import match_keys
 from hrc_env.core.mapping import for_json
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import provenance, write_whole
@@ -46,16 +46,16 @@ from .requests import RecordingRequest
 TOP = ("cost", "is_success")
 """Infos that are outside of the groups "belief" and "truth" in a Minari data set."""
 ROOT = "MINARI_DATASETS_PATH"
-"""Environment variable of Minari with the folder of data sets."""
+"""Name of Minari's environment variable for the folder of data sets."""
 MOST_BYTES = 4 * 2**30
-"""Greatest size of images of episodes that are played together, which stay in memory until their
-end."""
+"""Maximum size of the images of episodes that are played together, which stay in memory until the
+episodes end [bytes]."""
 Episode = dict[str, Any]
-"""Arrays by name: observations, of which there is one more than actions, and so on."""
+"""Arrays of an episode by name; there is one more observation than there are actions."""
 
 
 def run(request: RecordingRequest) -> int:
-    """Record episodes, print the place of the data set, and return the exit status.
+    """Record episodes, print the path of the data set, and return the exit status.
 
     Raises:
         MissingExtraError: Minari is needed and not installed.
@@ -101,7 +101,7 @@ def _count_steps(file: Path) -> int:
 
 
 def _check_free(path: Path) -> Path:
-    """Return the folder of a data set; raise `ConfigError` if it exists."""
+    """Return the path of a new folder; raise `ConfigError` if it exists already."""
     if path.exists():
         raise ConfigError(
             f"{path} exists already, and nothing is added to it: choose another --folder, or "
@@ -126,7 +126,7 @@ def format_command(request: RecordingRequest) -> str:
 def _describe(request: RecordingRequest) -> dict[str, Any]:
     """Return the metadata of a data set.
 
-    These are command, arguments, configuration, versions, seeds and cameras.
+    It includes the command, arguments, configuration, versions, seeds and cameras.
 
     Raises:
         ConfigError: the environment, or requested infos or images, are not available.
@@ -169,7 +169,7 @@ def _import_minari() -> Any:
 
 
 def _find_minari_path(minari: Any, name: str) -> Path:
-    """Return the folder of a new data set; raise `ConfigError` if it exists or the name is bad."""
+    """Return the folder of a new data set; raise `ConfigError` if it exists or has a bad name."""
     from minari.dataset.minari_dataset import parse_dataset_id
 
     try:
@@ -190,7 +190,7 @@ def _find_minari_path(minari: Any, name: str) -> Path:
 
 
 def _check_same_request(request: RecordingRequest, draft: Path) -> None:
-    """Create the draft's folder, or check that it was begun with the same arguments."""
+    """Create the draft folder, or check that it was created with the same arguments."""
     record, text = draft / "asked.json", json.dumps(asdict(request), indent=1, default=str)
     if record.exists() and record.read_text() != text:
         raise ConfigError(
@@ -201,7 +201,7 @@ def _check_same_request(request: RecordingRequest, draft: Path) -> None:
 
 
 def _play(request: RecordingRequest, first: int, n: int) -> list[Episode]:
-    """Return the episodes `first` to `first + n - 1`, played together."""
+    """Play the episodes `first` to `first + n - 1` together and return them."""
     env = HRCVectorEnv(n, **request.keywords())
     try:
         info, seed = env_info(env.shards.first), request.seed + first
@@ -224,13 +224,13 @@ def _play(request: RecordingRequest, first: int, n: int) -> list[Episode]:
 def _choose_parts(
     request: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int
 ) -> MomentParts:
-    """Return the requested parts of each moment of `n` episodes that are played together.
+    """Select the data to record at each moment of `n` episodes that are played together.
 
     Raises:
         ConfigError: an info does not exist, or there are more images than memory holds.
     """
     available = [name for name in info if not name.startswith("_")]
-    names = dict.fromkeys((*TOP, *matching(request.infos, available)))
+    names = dict.fromkeys((*TOP, *match_keys(request.infos, available)))
     if (images := env.shards.first.images) is not None:
         n_moments = (env.max_episode_steps + 1) * n
         n_bytes = n_moments * len(images.names) * int(np.prod(images.shape))
@@ -245,7 +245,7 @@ def _choose_parts(
 
 
 class _Clipped:
-    """An agent with actions that are clipped to the action space, as data sets require."""
+    """An agent with actions clipped to the action space, as data sets require."""
 
     def __init__(self, agent: Agent) -> None:
         self.agent = agent
@@ -258,7 +258,7 @@ class _Clipped:
 def _make_episode(
     first: Observation, steps: Sequence[Transition], moments: Sequence[Moment], b: int, seed: int
 ) -> Episode:
-    """Return the episode of environment `b`."""
+    """Assemble the arrays of the episode of environment `b`."""
     observations = [first, *(step.observation for step in steps)]
     parts = [each if isinstance(each, Mapping) else {"": each} for each in observations]
     return {
@@ -282,7 +282,7 @@ def _write_episode(path: Path, episode: Episode) -> None:
 def _write_minari(
     minari: Any, request: RecordingRequest, path: Path, draft: Path, episodes: list[Episode]
 ) -> None:
-    """Make the data set inside of the draft, then move it to its place."""
+    """Create the data set in the draft folder, then move it to its final path."""
     env = gymnasium.make(request.task, **request.keywords())
     with (
         contextlib.closing(env),
@@ -307,7 +307,7 @@ def _write_minari(
 
 @contextlib.contextmanager
 def _redirect_minari(folder: Path) -> Iterator[Path]:
-    """Let Minari write into this folder inside of the context."""
+    """Redirect Minari's output to a folder within the context."""
     before = os.environ.get(ROOT)
     os.environ[ROOT] = str(folder)
     try:
@@ -319,7 +319,7 @@ def _redirect_minari(folder: Path) -> Iterator[Path]:
 
 
 def _make_buffer(k: int, episode: Episode) -> Any:
-    """Return an episode as Minari takes it; belief, truth and keypoints are groups of infos."""
+    """Return an episode in Minari's format, with belief, truth and keypoints as groups of infos."""
     from minari.data_collector import EpisodeBuffer
 
     seen, infos = select_folder(episode, "observations"), dict[str, Any]()

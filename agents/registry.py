@@ -1,11 +1,11 @@
-"""Agents by name, from the package's policies, from a file, or by a function."""
+"""Creation of agents by name, from a policy of the package, from a file, or by a function."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from hrc_env.core.brought import check_arguments, function_called
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 from . import experts, policies, random
 from .env_info import Agent, EnvInfo
@@ -18,7 +18,7 @@ OTHERS = (
     "Stable-Baselines3 (.zip) or of python -m hrc_env export (.safetensors), or MODULE:FUNCTION, "
     "which takes an EnvInfo and returns an object with act(observation)"
 )
-"""Other forms of an agent, for errors."""
+"""Other valid forms of an agent's name, for error messages."""
 
 
 def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False) -> Agent:
@@ -27,12 +27,13 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
     Args:
         name: "random", "scripted", "scripted_slowed"; a policy of the package,
             "hrc://HRCReach-v0/NAME"; the path of a policy (.safetensors), or of a checkpoint of
-            `train` or of Stable-Baselines3 (.zip); or "module:function", a function of an
-            `EnvInfo`.
-        env_info: the environment in which it acts, as of `hrc_env.env_info`.
+            `train` or of Stable-Baselines3 (.zip); or "module:function", a function that takes an
+            `EnvInfo` and returns an agent.
+        env_info: information about the environment in which the agent acts, as `hrc_env.env_info`
+            returns it.
         seed: seed of a random agent.
         trust: whether pickles in a checkpoint may be loaded, which can run arbitrary code. Only
-            checkpoints with the author's own policy or network class, or with statistics of
+            checkpoints with a custom policy or network class, or with statistics of
             `VecNormalize`, need it.
 
     Raises:
@@ -55,10 +56,10 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
 
 
 def check_agent(name: str) -> None:
-    """Raise `ConfigError` for a name that is no agent, before an environment is made.
+    """Raise `ConfigError` if a name is not that of an agent, before an environment is created.
 
-    Files are searched, and functions are imported; whether they fit is checked when they get an
-    `EnvInfo`.
+    Files are located and functions are imported. `make_agent` checks whether they fit the
+    environment.
     """
     if not isinstance(name, str):
         raise ConfigError(f"An agent must be a name, got {type(name).__name__}. {_list_valid()}")
@@ -76,16 +77,16 @@ def check_agent(name: str) -> None:
     if ":" in name:
         find_function(name)
         return
-    raise ConfigError(f"{unknown('agent', name, AGENTS)} Or {OTHERS}.")
+    raise ConfigError(f"{make_unknown_name_error('agent', name, AGENTS)} Or {OTHERS}.")
 
 
 def is_policy(name: str) -> bool:
-    """Return whether a name is that of a policy that executes no code: hrc://, .safetensors."""
+    """Return whether a name is that of a policy without code (hrc://... or .safetensors)."""
     return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
 def find_control(name: str) -> str | None:
-    """Return the `control` for which a trained policy was made; None if the file has none."""
+    """Return the `control` with which a policy was trained, or None if its file has none."""
     check_agent(name)
     if is_policy(name):
         return policies.read(policies.find_path(name)).card.control
@@ -99,7 +100,7 @@ def find_control(name: str) -> str | None:
 
 
 def find_function(name: str) -> Callable[..., Any]:
-    """Return the function of a name "module:function".
+    """Import and return the function that is named "module:function".
 
     Raises:
         ConfigError: the function does not exist.
@@ -122,7 +123,7 @@ def _is_checkpoint(name: str) -> bool:
 
 
 def _call_function(name: str, env_info: EnvInfo) -> Agent:
-    """Return the agent that a function makes."""
+    """Call the named function, and return the agent that it creates."""
     agent = find_function(name)(env_info)
     if not callable(getattr(agent, "act", None)):
         raise ConfigError(

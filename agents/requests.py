@@ -1,6 +1,6 @@
-"""Requests for a training run, a recording and an export, which commands fill.
+"""Arguments of the commands that train, record and export.
 
-They can be read without simulator and learner.
+This module needs neither the simulator nor a learner.
 """
 
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from hrc_env.env_words import EnvironmentArguments
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingRequest(EnvironmentArguments):
-    """Request for a training run: task, learner, budget and evaluation."""
+    """Arguments of a training run: task, learner, budget and evaluation."""
 
     out: Path = Path("runs/quick")
     """Folder for checkpoints, curves, TensorBoard logs and the film."""
     algorithm: str | None = None
     """Learner: ppo; ppo_lagrangian, with a cost limit; or sac, with hindsight (HER) if the task has
-    separate goals. Defaults of this, control, demonstrations and timesteps are the task's
-    (agents/recipes.py)."""
+    separate goals. By default, the task's recipe (agents/recipes.py) sets this, control,
+    demonstrations and timesteps."""
     cost_limit: float | None = None
     """With ppo_lagrangian: limit of the cost of an episode (info["cost"], computed from the truth)
     [control steps]."""
     her: bool | None = None
-    """With sac: True or False, whether transitions are also relabelled with other goals (default:
-    if the task has goals)."""
+    """With sac: whether transitions are also relabelled with other goals, True or False (default:
+    True if the task has goals)."""
     demonstrations: int | None = None
     """Number of episodes of the scripted agent that the policy imitates before it is trained."""
     timesteps: int | None = None
@@ -35,24 +35,24 @@ class TrainingRequest(EnvironmentArguments):
     """Number of environments that step together; with --engine ray, in each worker."""
     engine: str = "sb3"
     """Library of the learner: sb3, Stable-Baselines3 on this machine; ray, RLlib's PPO with workers
-    that step environments on the machines of a cluster (docs/many_machines.md). Policies are the
-    same files."""
+    that step environments on the machines of a cluster (docs/many_machines.md). Both write the
+    same kind of policy files."""
     workers: int | None = None
     """With --engine ray: number of processes that step environments (default: one per core)."""
     address: str | None = None
-    """With --engine ray: the cluster, as auto, HOST:6379 or ray://HOST:10001 (default: one on this
-    machine)."""
+    """With --engine ray: address of the cluster, e.g. auto, HOST:6379 or ray://HOST:10001 (default:
+    start one on this machine)."""
     seed: int = 0
     """Seed of the environments and of the learner."""
     perception: str = "keypoints"
-    """Perception in the training: keypoints (camera emulator), truth or none; with --engine ray
+    """Perception during training: keypoints (camera emulator), truth or none; with --engine ray
     also pixels, which needs many machines."""
     proximity: float | None = None
     """Weight of proximity to the estimated body in the reward; 0 trains without it (default: 2, and
     0 with a cost limit)."""
     ramp: int = 400_000
-    """Environment steps in which that weight grows from 0, and a cost limit narrows, so that the
-    task is learnt first. 0: constant from the start; the policy learns several times slower, and is
+    """Environment steps over which the proximity weight grows from 0, or a cost limit tightens, to
+    learn the task first. With 0, both are constant: the policy learns several times slower and is
     more careful in the end."""
     threads: int | None = None
     """Number of threads that step the environments (default: all cores)."""
@@ -72,14 +72,17 @@ class TrainingRequest(EnvironmentArguments):
         return {**given, "config": config, **threads}
 
     def batched_keywords(self) -> dict[str, Any]:
-        """Keyword arguments of a batch with the same spaces: level pixels has no batched form."""
+        """Return the arguments of batched environments: keypoints in place of pixels.
+
+        Level `pixels` has no batched form; the spaces are the same.
+        """
         given = self.keywords()
         return {**given, "perception": "keypoints"} if self.perception == "pixels" else given
 
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingRequest(EnvironmentArguments):
-    """Request for a recording: agent, episodes, contents and place."""
+    """Arguments of a recording: agent, episodes, contents and destination."""
 
     agent: str = "scripted"
     """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train`
@@ -90,34 +93,34 @@ class RecordingRequest(EnvironmentArguments):
     episodes: int = 100
     """Number of episodes."""
     seed: int = 0
-    """Seed of the first episode; later ones count up."""
+    """Seed of the first episode; it increases by one with each further episode."""
     out: str | None = None
-    """Name of a Minari data set, with a version: hrc/pick-place/scripted-v0. This or --folder."""
+    """Name of a Minari data set with version, e.g. hrc/pick-place/scripted-v0; or use --folder."""
     folder: Path | None = None
-    """A new folder for the data set."""
+    """New folder for the data set; or use --out."""
     infos: tuple[str, ...] = ("cost", "is_success")
-    """Infos to record, by names or patterns: cost "safety/*" "reward/*"."""
+    """Infos to record, as names or patterns, e.g. cost "safety/*" "reward/*"."""
     poses: bool = False
-    """Record the workers' joints, estimated and true."""
+    """Record the estimated and true joints of workers."""
     keypoints: bool = False
-    """Record the keypoints that the estimator receives; with --perception keypoints."""
+    """Record the keypoints that the estimator receives (needs --perception keypoints)."""
     perception: str = "keypoints"
     """Perception of the robot: keypoints (camera emulator), truth or none."""
     num_envs: int = 16
-    """Number of environments that step together, and of episodes that are stored at once."""
+    """Number of environments that step together, and of episodes that are written together."""
 
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """Request for an export: run, name and evaluation of its policy."""
+    """Arguments of an export: run, name of the policy, and evaluation."""
 
     run_folder: Path
     """Folder of a run of `train`."""
     name: str
-    """Name of the policy: small letters, digits and _."""
+    """Name of the policy, of lowercase letters, digits and _."""
     out: Path = Path("policies")
     """Folder for ID/NAME.safetensors and ID/NAME.json."""
     episodes: int = 256
     """Number of episodes of each evaluation."""
     shields: tuple[str, ...] = ()
-    """Further shields for evaluations besides that of the training: none, or as --shield."""
+    """Shields for further evaluations besides that of the training: none, or values of --shield."""

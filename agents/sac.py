@@ -1,4 +1,4 @@
-"""Soft actor-critic by Stable-Baselines3, with hindsight if a task has separate goals.
+"""Soft actor-critic by Stable-Baselines3, with hindsight replay for tasks with separate goals.
 
 Haarnoja et al. 2018, arXiv:1801.01290; Andrychowicz et al. 2017, arXiv:1707.01495.
 """
@@ -23,17 +23,17 @@ def make_learner(
     tensorboard: Path | None = None,
     her: bool | None = None,
 ) -> SAC:
-    """Return a new SAC on `env`.
+    """Return a new SAC learner for `env`.
 
-    It begins to learn when every environment has finished an episode. The reward's other terms stay
-    as they are when a transition is relabelled with another goal.
+    It begins to learn when every environment has finished an episode. If a transition is relabelled
+    with another goal, the other terms of its reward do not change.
 
     Args:
-        env: the environments.
+        env: environments of the training.
         settings: settings of SAC.
         seed: seed of the learner.
         tensorboard: folder of TensorBoard logs.
-        her: whether to use hindsight (default: if the task has goals).
+        her: whether to use hindsight replay (default: True if the task has separate goals).
 
     Raises:
         NoGoalError: hindsight is requested, and the task has no separate goals.
@@ -53,12 +53,12 @@ def make_learner(
 
 
 def count_first_steps(env: HRCVecEnv) -> int:
-    """Return the steps that fill a new buffer with random actions: an episode per environment."""
+    """Return the number of random steps before learning, an episode of every environment."""
     return env.num_envs * (env.env.max_episode_steps + 1)
 
 
 class ResumedSAC(SAC):
-    """SAC for resumed runs: its empty buffer is filled with actions of its policy."""
+    """SAC for resumed runs, in which the policy fills the empty replay buffer."""
 
     def _sample_action(self, learning_starts: int, *args: Any, **kwargs: Any) -> Any:
         """Return noisy actions of the policy, from the first step on."""

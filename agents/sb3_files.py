@@ -1,10 +1,10 @@
-"""Policies of Stable-Baselines3, read from their files without executing code that files contain.
+"""Loading of Stable-Baselines3 policies without executing code from their files.
 
 A file of `model.save` is a zip: `policy.pth` holds the weights, and `data` is JSON, in which values
 that JSON cannot represent are pickles beside a plain description. Loading a pickle can run
-arbitrary code of its author. Weights alone do not, and the network for them is built here: from the
-plain description if its classes are of Stable-Baselines3 or of this package, otherwise from the
-pickle, which needs `trust`.
+arbitrary code of its author. Weights cannot, and their network is rebuilt here: from the plain
+description if its classes are of Stable-Baselines3 or of this package, otherwise from the pickle,
+which needs `trust`.
 """
 
 import base64
@@ -24,7 +24,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hrc_env.control import CONTROLS
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.observations import FLAT
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
@@ -38,7 +38,7 @@ with learner():
 
 TRUST = "If you trust its author: --trust, in Python trust=True."
 PICKLED = ":serialized:"
-"""Key of a value that JSON cannot represent, as base64 of a pickle."""
+"""Key of the base64-encoded pickle of a value that JSON cannot represent."""
 POLICIES = {
     "stable_baselines3.common.policies": (
         "ActorCriticPolicy", "ActorCriticCnnPolicy", "MultiInputActorCriticPolicy",
@@ -46,7 +46,10 @@ POLICIES = {
     "stable_baselines3.sac.policies": ("SACPolicy", "CnnPolicy", "MultiInputPolicy"),
     "stable_baselines3.td3.policies": ("TD3Policy", "CnnPolicy", "MultiInputPolicy"),
 }  # fmt: skip
-"""Policies that are built without a pickle, by module: of PPO and A2C, of SAC, of TD3 and DDPG."""
+"""Policy classes that can be rebuilt without unpickling, by module.
+
+The modules are those of PPO and A2C, of SAC, and of TD3 and DDPG.
+"""
 EXTRACTORS = {
     f"{module}.{name}"
     for module, names in {
@@ -57,7 +60,7 @@ EXTRACTORS = {
     }.items()
     for name in names
 }  # fmt: skip
-"""Feature extractors that are known without a pickle."""
+"""Feature extractors that can be rebuilt without unpickling."""
 ACTIVATIONS = tuple(
     f"torch.nn.modules.activation.{name}"
     for name in ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Mish", "Sigmoid")
@@ -69,13 +72,13 @@ BOX = re.compile(r"'([^']+)': Box\(.*?, \(([\d, ]*)\), \w+\)", re.S)
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
-    """Return the policy of a file of Stable-Baselines3, for acting.
+    """Load the policy in a file of Stable-Baselines3, for acting.
 
     Args:
         path: a file of `model.save`.
-        env_info: the environment in which it acts.
-        trust: whether pickles may be loaded if needed, for the author's own policy, network or
-            statistics of observations; they can run arbitrary code.
+        env_info: information about the environment in which the policy acts.
+        trust: whether pickles may be loaded if a custom policy or network, or statistics of
+            observations, require it; they can run arbitrary code.
 
     Raises:
         CheckpointError: the file does not exist, has other spaces, or needs `trust`.
@@ -98,16 +101,16 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
 
 
 def read_control(path: Path) -> str | None:
-    """Return the `control` of the environment in which a policy was trained; None if unknown.
+    """Return the `control` with which a policy was trained, or None if it is unknown.
 
     Raises:
-        CheckpointError: the file is not one of Stable-Baselines3.
+        CheckpointError: the file was not saved by Stable-Baselines3.
     """
     return _parse_control(_read(path).data)
 
 
 def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
-    """Raise `CheckpointError` for a policy that was trained with another `control`."""
+    """Raise `CheckpointError` if a policy was trained with another `control`."""
     if control != env_info.control:
         raise CheckpointError(
             f"{path} acts by control={control!r}, and this environment has control="
@@ -116,19 +119,19 @@ def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
 
 
 def _parse_control(data: Mapping[str, Any]) -> str | None:
-    """Return the attribute `control` of the action space (`hrc_env.env.spaces`)."""
+    """Return the attribute `control` of the action space (`hrc_env.env.spaces`), or None."""
     space = data.get("action_space")
     control = space.get("control") if isinstance(space, dict) else None
     return control if control in CONTROLS else None
 
 
 def check_is_one(path: Path) -> None:
-    """Raise `CheckpointError` if a file is not one of Stable-Baselines3."""
+    """Raise `CheckpointError` if a file was not saved by Stable-Baselines3."""
     _read(path)
 
 
 class Spaces(NamedTuple):
-    """The spaces of an environment."""
+    """Observation and action space of an environment."""
 
     observations: spaces.Space[Any]
     actions: spaces.Box
@@ -138,7 +141,7 @@ def make_spaces(env_info: EnvInfo, images: Sequence[str] = ()) -> Spaces:
     """Return the spaces of an environment's observations and actions.
 
     Args:
-        env_info: the environment.
+        env_info: information about the environment.
         images: names of the images that a policy uses; channels come first, as in
             Stable-Baselines3.
     """
@@ -162,23 +165,23 @@ class Statistics:
     wrapper: VecNormalize
 
     def apply(self, observation: Observation) -> Any:
-        """Return an observation scaled as in the training."""
+        """Return an observation that is scaled as in training."""
         return self.wrapper.normalize_obs(observation)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)
 class SB3Agent:
-    """The mean action of a policy of Stable-Baselines3."""
+    """An agent that takes the mean action of a policy of Stable-Baselines3."""
 
     policy: BasePolicy
-    """The policy."""
+    """The policy, in evaluation mode on the CPU."""
     statistics: Statistics | None = None
-    """Statistics of observations; None: they are used as they are."""
+    """Statistics that scale observations; None if they are used unscaled."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return deterministic actions (..., A), bit for bit those of `model.predict`.
 
-        Only those parts of an observation are used that were used in the training.
+        Parts of an observation that were not used in training are ignored.
         """
         if isinstance(observation, Mapping):
             space = self.policy.observation_space
@@ -190,12 +193,12 @@ class SB3Agent:
 
 
 class PolicyFile(NamedTuple):
-    """The contents of a policy's file."""
+    """The contents of a file of Stable-Baselines3."""
 
     data: Mapping[str, Any]
-    """The description."""
+    """Description of the learner, from the JSON in the file."""
     weights: Mapping[str, torch.Tensor]
-    """Weights by name."""
+    """Weights of the policy's network, by name."""
 
 
 def _read(path: Path) -> PolicyFile:
@@ -275,7 +278,7 @@ def _list_shapes(space: spaces.Space[Any]) -> Shapes:
 
 
 def _parse_shapes(space: Any) -> Shapes | None:
-    """Return the shapes of a space from its plain description; None if it has no boxes."""
+    """Return the shapes of a Box or Dict from its plain description; None for other spaces."""
     if not isinstance(space, dict) or ":type:" not in space:
         return None
     if ".box.Box'" in str(space[":type:"]):
@@ -287,7 +290,7 @@ def _parse_shapes(space: Any) -> Shapes | None:
 
 
 def _parse_numbers(text: Any) -> NDArray[np.float64]:
-    """Return the numbers of a printed array; none if there is no such text."""
+    """Return the numbers in the text of an array; they are empty if there is no text."""
     return np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", str(text or "")), float)
 
 
@@ -337,7 +340,7 @@ def _find_maker(path: Path, data: Mapping[str, Any], trust: bool) -> PolicyMaker
 
 
 def _find_policy_class(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | None:
-    """Return a policy's class, found by its module and the printed name of its constructor."""
+    """Return a class in `POLICIES` by its module and the text of its constructor, or None."""
     module = str(kind.get("__module__"))
     found = re.match(r"<function (\w+)\.__init__ ", str(kind.get("__init__")))
     if found is None or found[1] not in POLICIES.get(module, ()):
@@ -349,13 +352,13 @@ class PolicyKeywords(NamedTuple):
     """Arguments of a policy, split by their representation."""
 
     plain: dict[str, Any]
-    """Arguments that are known without a pickle."""
+    """Arguments that can be read without unpickling, by name."""
     strange: dict[str, str]
-    """Descriptions of the others."""
+    """Descriptions of the other arguments, by name."""
 
 
 def _split_keywords(saved: Mapping[str, Any]) -> PolicyKeywords:
-    """Return a policy's arguments, as far as they are plain, and descriptions of the others."""
+    """Split a policy's arguments into those that are plain and those that need unpickling."""
     given = {name: value for name, value in saved.items() if name not in NOT_FOR_ACTING}
     is_whole = PICKLED not in saved  # then all of it is JSON
     plain, strange = dict[str, Any](), dict[str, str]()
@@ -378,14 +381,14 @@ def _unpickle(path: Path, name: str, saved: Mapping[str, Any], expected: type) -
 
     try:
         found = cloudpickle.loads(base64.b64decode(saved[PICKLED]))
-    except Exception as error:  # objects of others can raise anything
+    except Exception as error:  # custom objects can raise any exception
         raise CheckpointError(
             f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). "
             "Its classes must be importable here."
         ) from error
     if not isinstance(found, expected):
         raise CheckpointError(
-            f"The {name} of {path} must be a {expected.__name__}, got {described(found)}."
+            f"The {name} of {path} must be a {expected.__name__}, got {describe(found)}."
         )
     return found
 

@@ -1,9 +1,9 @@
-"""A reacher without learning: straight to the goal, slower near people with `Yielding`.
+"""Scripted reaching, straight to the goal and, with `Yielding`, slower near people.
 
-The tool's speed is min(v_max, gain e, sqrt(2 a e)) for a distance e to the goal, resolved to joint
+The tool's speed is min(v_max, gain e, sqrt(2 a e)) for a distance e to the goal, converted to joint
 velocities by damped least squares (`hrc_env.control`). With `Yielding`, the speed is scaled by the
-*estimated* separation from the worker, as in the paper's motivation: the robot slows down for
-people it perceives, and is slow while people may be present unseen.
+*estimated* separation from the worker, as in the paper's motivation: the robot slows down near
+people it perceives, and moves slowly while unseen people may be present.
 """
 
 from dataclasses import dataclass
@@ -18,33 +18,33 @@ from .env_info import EnvInfo, Observation
 
 Array = NDArray[np.float64]
 GAIN_HZ = 4.0
-"""Approach speed per distance [1/s]."""
+"""Approach speed per distance to the goal [1/s]."""
 BRAKE_MPS2 = 2.5
-"""Deceleration that the speed allows for [m/s^2]."""
+"""Deceleration at which the tool can stop at its goal [m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Yielding:
-    """Slowing down by the estimated distance to people: linearly between two distances."""
+    """Slowing down near people, linearly in the estimated distance between two limits."""
 
     stop_m: float = 0.10
     """Distance below which the robot stands still [m]."""
     full_speed_m: float = 0.60
-    """Distance above which it has full speed [m]."""
+    """Distance above which the robot moves at full speed [m]."""
     unknown_m_s: float = 0.25
-    """Fastest motion of the tool and its load while a worker may be present unseen [m/s]; 0: stand
-    still."""
+    """Maximum speed of the tool and its load while an unseen worker may be present [m/s]; with 0
+    the robot stops."""
 
     def share(self, gap_m: Array) -> Array:
         """Return the share of full speed in [0, 1] for distances [m]."""
         return np.clip((gap_m - self.stop_m) / (self.full_speed_m - self.stop_m), 0.0, 1.0)
 
     def blind_share(self, terms: dict[str, Array], fastest_m_s: Array) -> Array:
-        """Return the share of an action in [0, 1] that unseen workers permit.
+        """Return the factor in [0, 1] on actions, less than 1 if unseen workers may be present.
 
         Args:
-            terms: terms of observations.
-            fastest_m_s: speed of the action's fastest point [m/s].
+            terms: terms of observations, by name.
+            fastest_m_s: speed (n,) of the fastest point of the tool and its load [m/s].
         """
         unknown = (terms["worker_unknown"] > 0.5).any(axis=-1)
         share = np.minimum(self.unknown_m_s / np.maximum(fastest_m_s, 1e-9), 1.0)
@@ -52,23 +52,23 @@ class Yielding:
 
 
 def fastest_m_s(velocity: Array, turn: Array, reach_m: float) -> Array:
-    """Return the greatest speed (n,) of points within reach of a moving tool [m/s].
+    """Return the maximum speed (n,) of points within `reach_m` of a moving tool [m/s].
 
     Args:
         velocity: velocity of the tool (n, 3) [m/s].
-        turn: turn rate of the tool (n, 3) [rad/s].
-        reach_m: distance of the farthest point [m].
+        turn: angular velocity of the tool (n, 3) [rad/s].
+        reach_m: distance of the farthest point from the tool [m].
     """
     return np.linalg.norm(velocity, axis=1) + reach_m * np.linalg.norm(turn, axis=1)
 
 
 def speed_m_s(error_m: Array, most_m_s: float) -> Array:
-    """Return the speed of a tool at a distance from its goal [m/s]."""
+    """Return the speed, at most `most_m_s`, of a tool at a distance from its goal [m/s]."""
     return np.minimum(np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m)), most_m_s)
 
 
 class Reacher:
-    """Reaches by resolved rates, with or without yielding."""
+    """An agent that reaches by resolved-rate control and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
@@ -78,7 +78,7 @@ class Reacher:
         return self.act_on(split(observation, self.env_info.layout))
 
     def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
-        """Return actions for an observation that is given by its terms."""
+        """Return actions (..., A) for the terms of an observation (`EnvInfo.split`)."""
         velocity, blind = self._compute_tool_velocity(terms["goal_from_tool"]), np.ones(1)
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)

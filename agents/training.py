@@ -1,4 +1,4 @@
-"""A training run: train, evaluate on fixed seeds, draw the curve, film; resume an earlier run."""
+"""Training runs: training, evaluation on fixed seeds, learning curve, film, and resuming."""
 
 import json
 import shlex
@@ -14,13 +14,13 @@ import numpy as np
 from rich.console import Console
 
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
-from hrc_env.core.mapping import restored
+from hrc_env.core.mapping import convert_to_hint
 from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
 from hrc_env.evaluation.episodes import Score, describe_contradiction, evaluate
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 from . import checkpoints, ppo, sac
 from .callbacks import (
@@ -45,12 +45,12 @@ with learner():
 
 
 class SettingsPair(NamedTuple):
-    """Settings of a learner."""
+    """Settings of a learner, without and with demonstrations."""
 
     alone: Any
-    """Settings without demonstrations."""
+    """Settings of training without demonstrations."""
     imitating: Any
-    """Settings after demonstrations."""
+    """Settings of training after imitation of demonstrations."""
 
 
 SETTINGS = {
@@ -58,7 +58,7 @@ SETTINGS = {
     "ppo_lagrangian": SettingsPair(PPOSettings(), IMITATOR),
     "sac": SettingsPair(SACSettings(), SACSettings(hidden=(256, 256))),
 }
-"""Settings by algorithm."""
+"""Settings of learners by algorithm."""
 DEMONSTRATION_SEED = 2_000_000
 """First seed of demonstrations, far from those of training and of evaluations."""
 ONLY_OF_A_RUN = (
@@ -66,9 +66,9 @@ ONLY_OF_A_RUN = (
 )  # fmt: skip
 """Arguments that a resumed run does not take from the run that it continues."""
 SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
-"""Names of the totals of two shares in a score."""
+"""Denominators of the two rates in a score, which are printed after their names."""
 FILM_SEEDS = 8
-"""Number of episodes among which the film shows the closest encounter with the worker."""
+"""Number of episodes from which the one with the closest encounter is filmed."""
 STOPPED = 130
 """Exit status of a run that Ctrl-C stopped."""
 
@@ -78,7 +78,10 @@ class TrainingResult(NamedTuple):
 
     curve: Curve
     times: dict[str, float] | None
-    """Times "training_s" by the clock and "processor_s" of all threads; None if it was stopped."""
+    """Wall-clock time "training_s" and processor time "processor_s" of all threads [s].
+
+    None if the training was stopped.
+    """
 
 
 class StartedLearner(NamedTuple):
@@ -86,15 +89,15 @@ class StartedLearner(NamedTuple):
 
     learner: Any
     curve: Curve
-    """The curve of an earlier part of the run."""
+    """Learning curve of the earlier part of a resumed run, otherwise empty."""
 
 
 def run(arguments: TrainingRequest) -> int:
-    """Train, evaluate, draw and film a policy; return the exit status.
+    """Train and evaluate a policy, plot its learning curve, and film it; return the exit status.
 
     Raises:
         CheckpointError: the run cannot be resumed.
-        ConfigError: the environment cannot be made.
+        ConfigError: the environment cannot be created.
     """
     torch.set_num_threads(1)  # two are slower in networks as small as these
     console = Console()
@@ -108,7 +111,7 @@ def run(arguments: TrainingRequest) -> int:
         return STOPPED
     score = judge(mine, folder, console)
     _write(folder / "score.json", {**asdict(score), **times})
-    config = settle(task=mine.task, config=mine.keywords()["config"]).config
+    config = resolve_settings(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", {describe_weight(curve, config.reward.proximity)}"
     title += f", shield {mine.shield}" if mine.shield else ""
@@ -127,7 +130,7 @@ def run(arguments: TrainingRequest) -> int:
 
 
 def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
-    """Evaluate the policy, and print its score."""
+    """Evaluate the policy of a run, print its score and return it."""
     checkpoint = folder / "policy.zip"
     console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
     score = evaluate(
@@ -141,14 +144,14 @@ def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
 
 
 def describe_weight(curve: Curve, whole: float) -> str:
-    """Return a text with the proximity term's last weight, and the whole one if it is larger."""
+    """Return a text with the last weight of the proximity term, and the full one if it differs."""
     reached = curve[-1].get("proximity", whole) if curve else whole
     of_whole = "" if reached == whole else f" of {whole:g}: the ramp was not finished"
     return f"proximity weight {reached:g}{of_whole}"
 
 
 def find_unused(folder: Path) -> Path:
-    """Return the folder, or the first of folder-2, folder-3, ... without a policy."""
+    """Return the first of folder, folder-2, folder-3, ... that contains no policy."""
     candidate, number = folder, 1
     while (candidate / "policy.zip").exists():
         number += 1
@@ -174,7 +177,7 @@ def restore_arguments(arguments: TrainingRequest, folder: Path) -> TrainingReque
 
 
 def read_arguments(folder: Path) -> TrainingRequest:
-    """Return the arguments of a run, without those in `ONLY_OF_A_RUN` except the steps.
+    """Read the arguments of a run; of those in `ONLY_OF_A_RUN`, only `timesteps` is included.
 
     Raises:
         CheckpointError: the folder holds no run.
@@ -189,11 +192,13 @@ def read_arguments(folder: Path) -> TrainingRequest:
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
     known, hints = {each.name for each in fields(TrainingRequest)}, get_type_hints(TrainingRequest)
     names = [name for name in saved if name in known - left]
-    return TrainingRequest(**{name: restored(hints[name], saved[name], name) for name in names})
+    return TrainingRequest(
+        **{name: convert_to_hint(hints[name], saved[name], name) for name in names}
+    )
 
 
 def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:
-    """Train a policy and return its curve; progress survives a kill of the process."""
+    """Train a policy and return the result; checkpoints remain if the process is killed."""
     kwargs = arguments.keywords()
     pair = SETTINGS[arguments.algorithm]
     settings = pair.imitating if arguments.demonstrations else pair.alone
@@ -236,7 +241,7 @@ def _make_envs(arguments: Run) -> HRCVecEnv:
 
 
 def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrupt) -> None:
-    """Train by Stable-Baselines3, from the learner's present state."""
+    """Train with Stable-Baselines3, starting from the current state of the learner."""
     learner, curriculum = log.learner, Curriculum(Ramp(arguments.ramp), env)
     learner.learn(
         arguments.timesteps - learner.num_timesteps,
@@ -249,7 +254,7 @@ def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrup
 def _make_learner(
     arguments: Run, folder: Path, env: HRCVecEnv, settings: Any, console: Console
 ) -> StartedLearner:
-    """Return a new learner, or that of the run that is resumed."""
+    """Create a new learner, or load the learner of the run that is resumed."""
     seed, log = arguments.seed, folder / "tensorboard"
     if arguments.resume is None and arguments.algorithm == "sac":
         return StartedLearner(sac.make_learner(env, settings, seed, log, arguments.her), [])
@@ -283,7 +288,7 @@ def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> No
 
 
 def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
-    """Film the policy's closest encounter with the worker; return whether this machine can draw."""
+    """Film the policy's closest encounter with a worker; return whether rendering is possible."""
     from hrc_env.evaluation.film import film_episode, find_nearest_seed
 
     def make(env_info: EnvInfo) -> checkpoints.TrainedAgent:

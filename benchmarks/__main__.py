@@ -1,6 +1,6 @@
 """The command `python -m benchmarks`.
 
-It measures estimators, detector, speed and workers, and draws workers.
+It measures the estimators, the detector, the speed and the motion of workers, and draws a gallery.
 """
 
 import sys
@@ -36,7 +36,7 @@ class BenchArguments(EngineArguments):
     out: Path
     """Folder for report.html, results.json, figures and finished parts."""
     quick: bool = False
-    """Make every number from less data: minutes, not hours."""
+    """Compute every number from less data, in minutes instead of hours."""
 
     def show(self, experiment: Experiment[Any]) -> int:
         """Run an experiment and print its tables; return the exit status."""
@@ -50,20 +50,20 @@ class TrackingArguments(BenchArguments):
     """Run every estimator on the same simulated sequences."""
 
     out: Path = Path("out/bench_tracking")
-    """Folder for the results; with --real and --baselines that word is added to its default."""
+    """Folder for the results; --real and --baselines append _real and _baselines to the default."""
     seeds: int | None = None
     """Number of sequences per rig and condition (default: 70, quick: 8)."""
     real: bool = False
-    """Use recorded films of four calibrated cameras instead, which are fetched once (51 MB)."""
+    """Use recorded films of four calibrated cameras instead, which are downloaded once (51 MB)."""
     estimators: tuple[str, ...] = ()
-    """Estimators to run besides particle: names (those of --import too, dlt, smoother), or
+    """Estimators to run besides particle: names (also of --import, dlt and smoother), or
     MODULE:FUNCTION, a function of (P, ctrl_dt, config)."""
     sequences: tuple[str, ...] = ()
-    """Sequences to run: a rig (lab, site, env), a condition (clean, occluded, hard, ...) or one of
-    a rig, as lab.hard."""
+    """Sequences to run: a rig (lab, site, env), a condition (clean, occluded, hard, ...), or both,
+    e.g. lab.hard."""
     baselines: bool = False
-    """Run other libraries instead, as far as they are installed, on the same sequences (5 per rig
-    and condition, quick: 1)."""
+    """Run the other libraries that are installed instead, on the same sequences (5 per rig and
+    condition, quick: 1)."""
 
     def run(self) -> int:
         """Run the benchmark and print its tables; return the exit status."""
@@ -93,7 +93,7 @@ class TrackingArguments(BenchArguments):
         return self.show(override(config, estimators=names, sequences=sequences))
 
     def _change_folder(self, ending: str) -> BenchArguments:
-        """Return arguments with another default folder."""
+        """Return the arguments with an ending appended to the folder if it is the default one."""
         is_usual = self.out == TrackingArguments.out
         out = Path(f"{self.out}{ending}") if is_usual else self.out
         return BenchArguments(out, engine=self.engine, workers=self.workers, address=self.address)
@@ -101,21 +101,20 @@ class TrackingArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class SpeedArguments(BenchArguments):
-    """Measure steps a second, the time of each part of a step, and resets.
+    """Measure steps per second, the time of each part of a step, and resets.
 
-    Gymnasium's Reacher and all other ids are measured besides. All take turns, so nothing else
-    should run on the machine.
+    Gymnasium's Reacher and all other ids are measured, too. Nothing else should run on the machine.
     """
 
     stays = "it measures time, which other processes would disturb"
     out: Path = Path("out/bench_speed")
     task: str | None = None
-    """Id of the environment; the other ids are then left out. Or "every": steps a second of each
-    id, and nothing else."""
+    """Id of the only environment to measure (default: HRCReach-v0 and the others); or "every" for
+    just the steps per second of each id."""
     shield: str | None = None
     """Shield that may change commands: qp, ssm, pfl, or a registered one (--import)."""
     rounds: int | None = None
-    """Number of rounds in which all take turns (default: 6, quick: 1); medians count."""
+    """Number of rounds, of which the median is reported (default: 6, quick: 1)."""
 
     def run(self) -> int:
         """Run the benchmark and print its tables; return the exit status."""
@@ -128,7 +127,7 @@ class SpeedArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class MotionArguments(BenchArguments):
-    """Play all motions of workers, and compare their statistics with those of people."""
+    """Play all motions of workers, and compare their statistics with measurements of people."""
 
     stays = "it has no independent parts"
     out: Path = Path("out/bench_motion")
@@ -183,9 +182,9 @@ class Gallery:
 class Benchmarks:
     """Measure the estimators, the detector, the environment or the workers, or draw a gallery.
 
-    These are tracking, perception, speed, motion and gallery. Each benchmark takes --quick
-    (minutes, not hours) and --out DIR, where it writes report.html, results.json and figures;
-    `tracking --help` and so on describe the rest.
+    The benchmarks are tracking, perception, speed and motion. Each takes --quick (minutes instead
+    of hours) and --out DIR, a folder for report.html, results.json and figures. `tracking --help`,
+    for example, describes the other options.
     """
 
     benchmark: (
@@ -203,7 +202,7 @@ class Benchmarks:
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a benchmark with the given words, or those of the process; return the exit status."""
+    """Run a benchmark with the given arguments, or those of the process; return the exit status."""
     given = list(sys.argv[1:] if words is None else words) or ["--help"]
     return show_errors(lambda: run_command(Benchmarks, import_first(given, PROGRAM), PROGRAM))
 

@@ -2,10 +2,11 @@
 
     python -m benchmarks.baselines
 
-Random actions, the scripted reacher without and with yielding, and PPO without and with the safety
-term are compared by return, goals a minute, cost and contacts on the same seeds. PPO is trained at
-the level of its evaluation; at `pixels`, which is too slow for training, the policy of `keypoints`
-acts. All are evaluated with the default reward, including the safety term.
+Random actions, the scripted reaching agent without and with slowing down near people, and PPO
+without and with the safety term are compared on the same seeds: return, goals per minute, cost and
+contacts. PPO is trained at the level of its evaluation. At `pixels`, which is too slow for
+training, the policy of `keypoints` is evaluated. The reward of all evaluations is the default one,
+which includes the safety term.
 """
 
 import sys
@@ -32,7 +33,7 @@ from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems that policies depend on."""
+"""Subsystems on which policies depend."""
 LEVELS = ("truth", "keypoints", "none", "pixels")
 """Perception levels."""
 NOTE = """\
@@ -54,24 +55,24 @@ class Variant(NamedTuple):
     words: str
     """Description in tables."""
     weight: float
-    """Weight of the safety term in the training."""
+    """Weight of the safety term during training."""
 
 
 PPO = {
     "ppo": Variant("PPO without the safety term", 0.0),
     "ppo_safety": Variant("PPO with the safety term", 2.0),
 }
-"""Learnt policies by name."""
+"""Variants of PPO by name."""
 AGENTS_SHOWN = {
     **{name: f"`{name}`" for name in AGENTS},
     **{name: variant.words for name, variant in PPO.items()},
 }
-"""Agents with their descriptions in tables."""
+"""Descriptions of agents in tables, by name."""
 
 
 @dataclass(frozen=True)
 class BaselinesArguments(StudyArguments):
-    """Evaluate the baselines; with --quick policies are hardly trained."""
+    """Evaluate the baselines; with --quick, policies are hardly trained."""
 
     out: Path = Path("out/baselines")
     """Folder for results.json, a report, policies and finished parts."""
@@ -79,7 +80,7 @@ class BaselinesArguments(StudyArguments):
     """Environment steps of a training (quick: 4096)."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid."""
         super().__post_init__()
         check_at_least("--timesteps", self.timesteps, 1)
 
@@ -89,8 +90,8 @@ def make_trainings(
 ) -> dict[tuple[str, str], Training]:
     """Return the training of each level and policy.
 
-    At `none` all workers are unknown: the safety term does not depend on the actions, so both
-    policies are the same.
+    At `none`, all workers are unknown and the safety term does not depend on the actions, which
+    makes both policies the same.
     """
     timesteps, trainings = 4096 if arguments.quick else arguments.timesteps, {}
     key = make_key({"timesteps": timesteps}, TRAINED_ON)
@@ -106,7 +107,7 @@ def make_trainings(
 
 
 def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
-    """Return the study of agents at all levels, with the policies that are trained."""
+    """Return the study of all agents at all levels; policies that do not exist are left out."""
     levels = dict.fromkeys(level for level, _ in trainings)
     shown = {
         f"{level}.{agent}": (f"`{level}`", words)
@@ -134,12 +135,12 @@ def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies that are in a folder."""
+    """Return the study of the command, with the policies in a folder."""
     return make_study(make_trainings(BaselinesArguments(out)))
 
 
 def main() -> int:
-    """Train and evaluate policies, and print the report; return the exit status."""
+    """Train and evaluate policies, print the report, and return the exit status."""
     arguments = tyro.cli(BaselinesArguments, description=__doc__)
     torch.set_num_threads(1)  # two are slower in networks as small as these
     trainings = make_trainings(arguments)

@@ -1,14 +1,14 @@
-"""Speed of other environments in steps a second.
+"""Speed of other environments in steps per second.
 
-It does not import hrc_env, as gymnasium-robotics and robosuite need other versions of MuJoCo and
-NumPy. It runs in a virtual environment of its own:
+This script does not import hrc_env, since gymnasium-robotics and robosuite need other versions of
+MuJoCo and NumPy. It runs in a virtual environment of its own:
 
     python3.11 -m venv others
     others/bin/pip install "gymnasium-robotics==1.4.2" "robosuite==1.5.2" "mujoco==3.5.*" "numpy<2"
     others/bin/python benchmarks/baselines_speed.py
 
-Environments that are missing are reported. Actions are random, resets are included, infos are read;
-the result is the median of runs that take turns with Gymnasium's Reacher.
+Missing environments are reported. Actions are random, resets are included, and infos are read. The
+result is the median of several runs, in which all environments take turns.
 """
 
 import statistics
@@ -18,11 +18,11 @@ from typing import Any
 import gymnasium
 
 RUNS, SECONDS = 5, 4.0
-"""Number of runs, and the length of a run [s]."""
+"""Number of runs, and duration of a run [s]."""
 
 
 def make_fetch_reach() -> Any:
-    """Return a task of gymnasium-robotics: a Fetch arm reaches for a point."""
+    """Create the task of gymnasium-robotics in which a Fetch arm reaches for a point."""
     import gymnasium_robotics
 
     gymnasium.register_envs(gymnasium_robotics)
@@ -30,7 +30,7 @@ def make_fetch_reach() -> Any:
 
 
 def make_lift() -> Any:
-    """Return a task of robosuite: a Panda lifts a cube; no cameras."""
+    """Create the task of robosuite in which a Panda lifts a cube, without cameras."""
     import robosuite
     from robosuite.wrappers import GymWrapper
 
@@ -43,11 +43,11 @@ FACTORIES = {
     "FetchReach-v4": make_fetch_reach,
     "robosuite Lift, Panda": make_lift,
 }
-"""Functions that make the environments, by name."""
+"""Functions that create the environments, by name."""
 
 
 def measure_pace(env: Any) -> float:
-    """Return the speed of an environment in steps a second."""
+    """Return the speed of an environment in steps per second."""
     n_steps, started_s = 0, time.perf_counter()
     env.reset()
     while time.perf_counter() - started_s < SECONDS:
@@ -61,7 +61,7 @@ def measure_pace(env: Any) -> float:
 
 
 def main() -> None:
-    """Measure all environments and print their speed."""
+    """Measure the speed of all environments and print it."""
     envs = {}
     for name, make in FACTORIES.items():
         try:

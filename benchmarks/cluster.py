@@ -1,10 +1,11 @@
 """Speed of training with workers of RLlib: python -m benchmarks.cluster [--quick] [--out DIR].
 
-One and two workers take turns on this machine with Stable-Baselines3 without workers. The bench
-measures the time that 64 environments of each worker take for a rollout of 64 steps, and the time
-that PPO takes to learn from it. A model follows from one worker: workers step at the same time, and
-one core learns from the steps of all; so n workers take the time of one rollout and n times the
-time of learning from it. It is compared with two workers and extrapolated to more.
+One worker, two workers and Stable-Baselines3 without workers take turns on this machine. The
+benchmark measures the duration of a rollout of 64 steps of each worker's 64 environments, and of
+learning from it by PPO. These times of one worker give a model: workers step in parallel, and one
+core learns from the steps of all of them. An update with n workers takes the time of one rollout
+plus n times the time of learning from it. The model is compared with two workers and extrapolated
+to more.
 """
 
 import sys
@@ -34,7 +35,7 @@ KEYWORDS: Mapping[str, Any] = {"task": "HRCReach-v0", "perception": "keypoints"}
 NUM_ENVS = 64
 MEASURED = (1, 2)
 MODELLED = (10, 100, 1000)
-"""Numbers of workers of the model."""
+"""Numbers of workers to which the model is extrapolated."""
 GBIT_BYTES_S = 125e6
 """Capacity of a network of 1 Gbit/s [bytes/s]."""
 PREFIX = "ray_hrc_env_"
@@ -44,7 +45,7 @@ SHOWN = {
     f"{PREFIX}goals_total": "goals",
     f"{PREFIX}contacts_total": "contacts",
 }
-"""Metrics of Ray in the figure, and their axis labels."""
+"""Axis labels in the figure of Ray's metrics, by their names."""
 Played = Mapping[str, list[float]]
 
 TABLE = Table(
@@ -83,14 +84,14 @@ TABLE = Table(
 
 @dataclass(frozen=True, slots=True)
 class ClusterBench:
-    """The bench, and its extent."""
+    """The benchmark, and its amount of data."""
 
     name = "cluster"
     depends = ("env", "tracker", "emulator", "motion", "agents")
     n_rounds: int = 12
-    """Number of rounds in which one and two workers take turns."""
+    """Number of rounds in which the contenders take turns."""
     n_watched: int = 60
-    """Number of updates of two workers for which the metrics of Ray are read."""
+    """Number of updates with two workers after which the metrics of Ray are read."""
 
     @property
     def seeds(self) -> Sequence[int]:
@@ -104,16 +105,16 @@ class ClusterBench:
 
     @property
     def quick_note(self) -> str:
-        """The warning of a short run; "" of others."""
+        """Warning on a short run, or "" if it is long enough."""
         is_short = self.n_rounds < ClusterBench().n_rounds
         return f"Quick run, {self.n_rounds} rounds: too few to compare." if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which its metrics depend."""
+        """Return the settings on which the metrics depend."""
         return {**asdict(self), "environment": dict(KEYWORDS), "num_envs": NUM_ENVS}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the times of every round, and the metrics that Ray exported during a run."""
+        """Measure the times of every round, and the metrics that Ray exports during a run."""
         times = cache.make_part("times", self._times)
         return times | cache.make_part("watched", self._watched)
 
@@ -158,7 +159,7 @@ class ClusterBench:
         return (TABLE,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Draw the metrics of Ray; return the table beside them."""
+        """Plot the metrics of Ray, and return the report with the table."""
         drawn = _draw(played, figures / "metrics.png")
         about = (__doc__ or "").partition("\n")[2].strip()
         parts = [
@@ -170,7 +171,7 @@ class ClusterBench:
 
 @contextmanager
 def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
-    """Yield learners by their numbers of workers, which wait during the turns of others."""
+    """Yield learners by their numbers of workers; they wait during the turns of the others."""
     from hrc_env.agents import ppo  # here and below: learner and Ray take seconds to import
     from hrc_env.agents.learner_settings import PPOSettings
     from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
@@ -185,7 +186,7 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
         try:
             for n in numbers:
                 policy = ppo.make_learner(HRCVecEnv(1, **KEYWORDS), PPOSettings(), 0)
-                share = 1 / len(numbers)  # all are there at once, and one of them works
+                share = 1 / len(numbers)  # all exist at once, and one of them works
                 runners = RunnerSettings(KEYWORDS, n, NUM_ENVS, 0, share, pack())
                 made[n] = RLlibPPO(policy, PPOSettings(), runners)
             yield made
@@ -196,9 +197,9 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
 
 @contextmanager
 def _alone() -> Iterator[Callable[[], float]]:
-    """Yield a function that trains Stable-Baselines3 on a rollout and returns its steps a second.
+    """Yield a function that trains Stable-Baselines3 on a rollout and returns steps per second.
 
-    It has as many environments as a worker, stepped by all cores.
+    There are as many environments as those of a worker, which are stepped by all cores.
     """
     import torch
 
@@ -223,17 +224,17 @@ class _Turn(NamedTuple):
     """Times and sizes of a rollout of all workers."""
 
     sampled_s: float
-    """Time of the rollout alone [s]."""
+    """Time of a rollout alone [s]."""
     updated_s: float
-    """Time of another rollout with learning from it [s]."""
+    """Time of another rollout and of learning from it [s]."""
     n_steps: int
     """Number of steps of the rollout."""
     n_bytes: int
-    """Size of the rollout as it is sent."""
+    """Size of the serialized rollout [bytes]."""
 
 
 def _measure_turn(learner: Any) -> _Turn:
-    """Sample once alone, and once with learning."""
+    """Time a rollout without learning, and another one with learning."""
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
@@ -246,7 +247,7 @@ def _measure_turn(learner: Any) -> _Turn:
 
 
 def _exported() -> dict[str, float]:
-    """Return the metrics of this package that this machine exports, by name."""
+    """Return the values of this package's metrics that Ray exports on this machine, by name."""
     import ray
 
     (node,) = ray.nodes()
@@ -258,7 +259,7 @@ def _exported() -> dict[str, float]:
 
 
 def _draw(played: Played, path: Path) -> Path:
-    """Draw the metrics of Ray over the time of the run."""
+    """Plot the metrics of Ray over the time of the run."""
     figure = make_figure(9, 6)
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axis, (name, words) in zip(panels, SHOWN.items(), strict=True):
@@ -270,7 +271,7 @@ def _draw(played: Played, path: Path) -> Path:
 
 
 def _step_s(n_steps: int = 50) -> float:
-    """Return the time of a step of the environments alone, on one thread [s]."""
+    """Return the time of a step of the environments without a learner, on one thread [s]."""
     from hrc_env.agents.rllib.runner_env import make_envs
 
     with closing(make_envs(NUM_ENVS, KEYWORDS)) as env:
@@ -283,7 +284,7 @@ def _step_s(n_steps: int = 50) -> float:
 
 
 def metrics_of(played: Played) -> dict[str, Metric]:
-    """Return the metrics of the rounds' times and of the model."""
+    """Compute the metrics of the measured times and of the model."""
     found = {name: over(played[name], "s") for name in ("step_s", "update_s.1", "update_s.2")}
     found["bytes_per_step"] = over(played["bytes_per_step"], "byte")
     times = {name: np.array(values) for name, values in played.items()}
@@ -313,17 +314,17 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 
 
 def _exact(value: float, unit: str) -> Metric:
-    """Return a number of the model, which has no interval."""
+    """Return a metric without an interval, for a number of the model."""
     return Metric(value, value, value, unit, 1)
 
 
 def make_study(quick: bool = False) -> ClusterBench:
-    """Return the bench."""
+    """Return the benchmark."""
     return ClusterBench(2, 6) if quick else ClusterBench()
 
 
 def main() -> int:
-    """Run the bench with the command line's arguments; return the exit status."""
+    """Run the benchmark with the arguments of the process; return the exit status."""
     import tyro
 
     from hrc_env.cli.entry import show_errors

@@ -27,22 +27,22 @@ class Arguments(EngineArguments):
     out: Path
     """Folder for results.json, a report and finished parts."""
     quick: bool = False
-    """Make every number from a few episodes."""
+    """Compute every number from a few episodes."""
     overwrite: bool = False
-    """Delete other results in the folder."""
+    """Delete results of other settings in the folder."""
 
 
 @dataclass(frozen=True)
 class StudyArguments(Arguments):
-    """Arguments of every study of whole episodes."""
+    """Arguments of every study that plays whole episodes."""
 
     only: tuple[str, ...] = ()
-    """Rows to run, by the beginnings of their names (default: all)."""
+    """Rows to run, given by prefixes of their names (default: all)."""
     threads: int | None = None
     """Number of threads that the environments share (default: all cores)."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid."""
         check_at_least("--threads", self.threads, 1)
 
 
@@ -60,8 +60,8 @@ def main(make: Callable[[], Study], about: str | None) -> int:
     """Run a study with the arguments of the process; return the exit status.
 
     Args:
-        make: makes the study.
-        about: the module's docstring, for `--help`.
+        make: function that creates the study.
+        about: docstring of the module, which `--help` prints.
     """
 
     def run() -> int:

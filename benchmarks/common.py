@@ -1,4 +1,4 @@
-"""Functions that the benchmarks share: normalized errors, cells of tables, names of metrics."""
+"""Functions that the benchmarks share, for normalized errors, tables and names of metrics."""
 
 from collections.abc import Iterable
 
@@ -13,9 +13,9 @@ TASKS = tuple(dict.fromkeys((
     "HRCReach-v0", "HRCReachGoal-v0", "HRCPickPlace-v0", "HRCPickPlaceGoal-v0", "HRCHandover-v0",
     "HRCDrywall-v0", "HRCDelivery-v0", *BUILT_IN,
 )))  # fmt: skip
-"""All built-in tasks in the order of tables."""
+"""Ids of all built-in tasks, in the order of tables."""
 CHI2_95_3D = 7.815
-"""Squared Mahalanobis distance of the 95 % region of a normal variable in three dimensions."""
+"""Squared Mahalanobis radius of the 95 % region of a normal distribution in three dimensions."""
 
 
 def make_exact(value: float, unit: str, n: int = 1) -> Metric:
@@ -24,12 +24,12 @@ def make_exact(value: float, unit: str, n: int = 1) -> Metric:
 
 
 def compute_normalized_square(offset: Points3, cov: Covariances3) -> Floats:
-    """Return squared errors (...,) of offsets (..., 3) relative to covariances (..., 3, 3)."""
+    """Return squared Mahalanobis distances (...,) of offsets (..., 3), given their covariances."""
     return np.einsum("...i,...ij,...j->...", offset, np.linalg.inv(cov), offset)
 
 
 def list_endings(metrics: Iterable[str], start: str) -> list[str]:
-    """Return the rest of each name that begins with `start`."""
+    """Return the names that begin with `start`, without this prefix."""
     return [name.removeprefix(start) for name in metrics if name.startswith(start)]
 
 

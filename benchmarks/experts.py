@@ -2,8 +2,8 @@
 
     python -m benchmarks.experts
 
-Success, time, cost and contacts on the same seeds: without workers, and beside attentive ones at
-several perception levels. Episodes at `pixels` are played one by one.
+Success, time, cost and contacts are measured on the same seeds without workers, and beside
+attentive workers at several perception levels. Episodes at `pixels` are played one after the other.
 """
 
 import sys
@@ -20,7 +20,7 @@ from hrc_env.tasks import BUILT_IN
 
 
 class Way(NamedTuple):
-    """A way to play a task."""
+    """An agent and a perception level with which a task is played."""
 
     agent: str
     level: str
@@ -34,9 +34,9 @@ WAYS = {
     "slowed": Way("scripted_slowed", "keypoints"),
     "pixels": Way("scripted", "pixels"),
 }
-"""Ways by their names in the table."""
+"""Ways to play a task, by their names in the table."""
 NEEDS_WORKERS = ("HRCHandover-v0",)
-"""Tasks that need a worker."""
+"""Tasks that cannot be played without a worker."""
 
 
 def _make_row(task: str, way: str) -> Row:

@@ -3,12 +3,12 @@
     python -m benchmarks.facing
 
 The paper concludes that a single camera gives an accurate 3D pose only of people who face it. Here
-workers of all bodies work in view of the four cameras of the laboratory, which see every moment at
-four yaws. Errors are sorted by the angle between the direction of the trunk and that to the camera,
-left and right together: errors of detections in each camera's image, while all four follow; and
-errors in the room with one camera that remains after the first second, which is not evaluated.
-Joints that furniture, robot or load hides from that camera, or that are outside of its image, do
-not count; joints that the body itself hides do.
+workers of all bodies work in view of the four cameras of the laboratory, which see every moment
+from four directions. Errors are grouped by the absolute angle between the heading of the trunk and
+the direction to the camera. These are the errors of detections in each camera's image while all
+four cameras work, and 3D errors with one camera that remains after the first second, which is not
+evaluated. Joints are left out if furniture, robot or load hides them from that camera, or if they
+are outside its image; joints that the body itself hides are included.
 """
 
 import sys
@@ -52,18 +52,18 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_truth
 
 YAWS = {0: "faces it", 45: "45 degrees", 90: "sideways", 135: "135 degrees", 180: "turns its back"}
-"""Middles of the ranges of 45 degrees (the outer ones are half), with descriptions."""
+"""Centres of ranges of angles with descriptions; ranges are 45 degrees wide, at the ends half."""
 ESTIMATORS = {"keypoints": ("particle", "paper"), "pixels": ("particle",)}
-"""Estimators that are used with one camera, by level."""
+"""Estimators that are evaluated with one camera, by perception level."""
 SHARES = Bins(np.geomspace(1e-4, 10, 600))
-"""Bins of image errors as shares of the stature."""
+"""Bins of image errors, as shares of the stature."""
 Counts = dict[str, Any]
-"""Counts by name, one row per episode."""
+"""Counts by name, each with one row per episode."""
 
 
 @dataclass(frozen=True, slots=True)
 class Facing:
-    """The experiment, and the amount of data that is played."""
+    """The experiment, and its amount of data."""
 
     name = "facing"
     depends = ("env", "tracker", "emulator", "detector", "motion")
@@ -86,16 +86,16 @@ class Facing:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """Warning on the tables and figures of a short run, or "" if it is long enough."""
         is_short = max(self.episodes) < max(Facing().episodes)
         return describe_quick_run(max(self.episodes), self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return asdict(self)
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Return the metrics of both levels, each from the cache or computed."""
+        """Return the metrics of both levels, each computed or from the cache."""
         key = make_key({"seconds": self.seconds, "seed": self.seed}, self.depends)
         metrics: dict[str, Metric] = {}
         parts = [
@@ -107,7 +107,7 @@ class Facing:
         return metrics
 
     def _measure(self, level: str, n: int, tick: PartProgress) -> dict[str, Any]:
-        """Return the metrics of a level."""
+        """Return the metrics of a level as JSON."""
         return {name: asdict(m) for name, m in measure_level(level, n, self).items()}
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
@@ -128,28 +128,28 @@ class Facing:
 
 
 class Frame(NamedTuple):
-    """A moment of some episodes, with C evaluated cameras and J joints of one worker."""
+    """A frame of B episodes, with C evaluated cameras and J joints of one worker."""
 
     joints_world: Points3
     """True joints (B, J, 3) [m]."""
     eyes_world: Points3
     """Positions of the cameras (C, 3) [m]."""
     yaw: Ints
-    """Index in `YAWS` (B, C)."""
+    """Index (B, C) in `YAWS` of the worker's direction relative to each camera."""
     free: Bools
-    """Whether at most the body hides the joint (B, C, J)."""
+    """Mask (B, C, J) of joints in the image that nothing but the body itself hides."""
     off_share: Floats
-    """Error in the image as a share of the stature there (B, C, J); NaN: no detection."""
+    """Error in the image as a share of the stature in it (B, C, J); NaN without a detection."""
     sure: Bools
-    """Whether the detector's confidence is high (B, C, J)."""
+    """Mask (B, C, J) of joints with high confidence of the detector."""
     estimate: PoseEstimate
-    """The estimate."""
+    """Estimated pose after the frame."""
 
 
 def iterate_frames(
     level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence[int], ids: Ints
 ) -> Iterator[Frame]:
-    """Yield the frames of episodes `ids` with the cameras `kept`, after the warm-up."""
+    """Yield the frames after the warm-up of episodes `ids`, with the cameras `kept`."""
     turn, batch = keep_cameras(RIGS["lab"], kept), np.arange(len(ids))
     config = HRCConfig(worker=BODIES, faults=turn.faults)
     scene = build(config.scene, "lab", 1, walks.bodies.names)
@@ -182,7 +182,7 @@ def iterate_frames(
 
 
 def find_yaw(joints_world: Points3, eyes_world: Points3) -> Ints:
-    """Return the index in `YAWS` (B, C) of bodies (B, J, 3) relative to cameras (C, 3)."""
+    """Return the index (B, C) in `YAWS` of bodies (B, J, 3) as seen from cameras (C, 3)."""
     to_eye = eyes_world - joints_world[:, None, TORSO].mean(2)
     turn = heading(joints_world)[:, None] - np.arctan2(to_eye[..., 1], to_eye[..., 0])
     return np.rint(np.abs((turn + np.pi) % (2 * np.pi) - np.pi) / np.radians(45)).astype(int)
@@ -191,9 +191,9 @@ def find_yaw(joints_world: Points3, eyes_world: Points3) -> Ints:
 def count_errors(
     level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence[int]
 ) -> Counts:
-    """Return counts of errors and numbers of joints by "<number>.<yaw>", one row per episode.
+    """Return counts of errors and of joints by "<name>.<yaw>", with one row per episode.
 
-    With all cameras each episode counts; with one, every fourth.
+    With all cameras every episode is played; with a single one, every fourth.
     """
     ids, counts = np.arange(len(seeds)), Counts()
     if len(kept) == 1:
@@ -221,7 +221,7 @@ def count_errors(
 
 
 def measure_level(level: str, n_episodes: int, facing: Facing) -> dict[str, Metric]:
-    """Return the metrics of a level, with intervals over episodes."""
+    """Compute the metrics of a level, with intervals over episodes."""
     seeds, metrics = tuple(range(facing.seed, facing.seed + n_episodes)), {}
     walks = make_walks("lab", 1, seeds, round(facing.seconds / DT_S))
     seen = count_errors(level, "particle", ALL, walks, seeds)

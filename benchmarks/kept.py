@@ -2,9 +2,9 @@
 
     python -m benchmarks.kept
 
-Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made are part of
-the package, one or more for every task. Each is evaluated as it was trained and with the shield
-`qp`, on the same fixed seeds.
+The package contains policies that `python -m benchmarks.learners` and `python -m
+benchmarks.limited` trained, at least one for every task. Each is evaluated without a shield and
+with the shield `qp`, on the same fixed seeds.
 """
 
 import sys
@@ -18,7 +18,7 @@ from hrc_env.experiments.study import Row, Study
 
 
 def _make_row(address: str, shield: str | None) -> Row:
-    """Return the row of a policy with a shield."""
+    """Return the row of a policy with or without a shield."""
     card = policies.read(policies.find_path(address)).card
     env = {"task": card.task, "control": card.control, "shield": shield}
     return Row((f"`{address}`", f"`{shield}`" if shield else "none"), 48, address, env=env)

@@ -2,10 +2,10 @@
 
     python -m benchmarks.learners
 
-Each id is trained by the command on its page, `python -m hrc_env train --task ID`, with three
-seeds, and evaluated beside its scripted agent on the same fixed seeds: success, cost, contacts, and
-time of the training. For policies the median of the seeds is shown, lowest to highest; for contacts
-the ends of their exact 95 % intervals.
+For each task, policies of three seeds are trained by the command on its page, `python -m hrc_env
+train --task ID`, and compared with the scripted agent on the same fixed seeds: success, cost and
+contacts, and the time of the training. For policies, the table shows the median of the seeds with
+the lowest and the highest; for contacts, the range covers their exact 95 % intervals.
 """
 
 import sys
@@ -34,16 +34,16 @@ from hrc_env.experiments.versions import make_key
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems that policies and finished parts depend on."""
+"""Subsystems on which policies and finished parts depend."""
 MEASURED = ("success", "cost", "contacts")
-"""Metrics of the seeds that are summarized."""
+"""Metrics that are summarized over the seeds."""
 Trainings = Mapping[str, list[Training]]
 """Trainings by task, one per seed."""
 
 
 @dataclass(frozen=True)
 class LearnersArguments(StudyArguments):
-    """Train a policy for every task; with --quick one seed, with hardly any training."""
+    """Train policies for every task; with --quick, one seed with hardly any training."""
 
     out: Path = Path("out/learners")
     """Folder for results.json, the report, policies and finished parts."""
@@ -105,7 +105,7 @@ def make_study(trainings: Trainings) -> Study:
 
 
 def summarize(metrics: Metrics, trainings: Trainings) -> dict[str, Metric]:
-    """Return the metrics over the seeds of every task, and the time of the trainings."""
+    """Summarize the metrics over the seeds of every task, and the times of the trainings."""
     summary = {}
     for task, runs in trainings.items():
         seeds = [f"{task}.policy_{k}" for k, run in enumerate(runs) if run.is_finished]
@@ -127,12 +127,12 @@ def summarize(metrics: Metrics, trainings: Trainings) -> dict[str, Metric]:
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies that are in a folder."""
+    """Return the study of the command, with the policies in a folder."""
     return make_study(make_trainings(LearnersArguments(out)))
 
 
 def main() -> int:
-    """Train and evaluate policies, and print the report; return the exit status."""
+    """Train and evaluate policies, print the report, and return the exit status."""
     arguments = tyro.cli(LearnersArguments, description=__doc__)
     torch.set_num_threads(1)  # two are slower in networks as small as these
     trainings = make_trainings(arguments)

@@ -1,6 +1,6 @@
-"""Policies that studies evaluate.
+"""Training of policies that studies evaluate, by `python -m hrc_env train`.
 
-They are trained by `python -m hrc_env train` and stored in the study's folder.
+Policies are stored in the folder of the study.
 """
 
 import json
@@ -15,16 +15,16 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """A run of `train`."""
+    """A run of `python -m hrc_env train`."""
 
     folder: Path
-    """Folder of this run alone, named after its options."""
+    """Folder of this run only, named after its options."""
     options: Mapping[str, Any]
     """Options of the command, without `--`."""
 
     @property
     def policy(self) -> Path:
-        """The checkpoint, which may not exist yet."""
+        """Path of the checkpoint, which may not exist yet."""
         return self.folder / "policy.zip"
 
     @property
@@ -34,11 +34,11 @@ class Training:
 
     @property
     def score(self) -> dict[str, Any]:
-        """The score that `train` wrote at its end."""
+        """Score that `train` wrote at its end."""
         return json.loads((self.folder / "score.json").read_text())
 
     def run(self) -> None:
-        """Train, or continue the training, unless it is finished."""
+        """Train the policy, or continue its training, unless it is finished."""
         if self.is_finished:
             return
         place = {"resume" if self.policy.exists() else "out": self.folder}

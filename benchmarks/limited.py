@@ -1,11 +1,11 @@
-"""Training with a cost limit, or without one and then with a shield.
+"""Training with a cost limit, compared with a shield at the evaluation.
 
     python -m benchmarks.limited
 
-For each seed PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For the
-first the table shows when it reached its limit and how well it kept it: the cost of its noisy
-actions, from the truth, over windows of 250,000 steps, which are 1,000 episodes. Both are evaluated
-on the same fixed seeds, the second also with a shield.
+For each seed, PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For
+PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept: the true
+cost of noisy actions in windows of 250,000 steps, or 1,000 episodes. Both policies are evaluated on
+the same fixed seeds, that of PPO also with a shield.
 """
 
 import json
@@ -34,20 +34,20 @@ from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems that policies depend on."""
+"""Subsystems on which policies depend."""
 WINDOW_STEPS, N_WINDOWS = 250_000, 2
-"""Length of a window [steps], and number of last windows that count."""
+"""Length of a window [steps], and number of windows at the end that are evaluated."""
 REACHED = 1.1
-"""Factor on the limit below which it counts as reached."""
+"""Multiple of the limit below which a cost counts as having reached it."""
 
 
 class Variant(NamedTuple):
-    """A row of a seed."""
+    """A kind of row, of which each seed has one."""
 
     words: str
     """Description in tables."""
     shield: str | None
-    """Shield of the evaluation."""
+    """Shield of the evaluation, or None."""
 
 
 WORDS = {
@@ -55,7 +55,7 @@ WORDS = {
     "fast": Variant("PPO without a safety term, evaluated with `qp`", "qp"),
     "bare": Variant("the same policies, evaluated without a shield", None),
 }
-"""Rows of a seed by name."""
+"""Kinds of rows by name."""
 TITLE = "Cost limit or shield"
 Trainings = Mapping[tuple[str, int], Training]
 """Trainings by learner and seed."""
@@ -63,14 +63,14 @@ Trainings = Mapping[tuple[str, int], Training]
 
 @dataclass(frozen=True)
 class LimitedArguments(StudyArguments):
-    """Train with a cost limit on several seeds; with --quick for some thousand steps."""
+    """Train with a cost limit on several seeds; with --quick, for a few thousand steps only."""
 
     out: Path = Path("out/limited")
     """Folder for the runs, results.json and the report."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds of environments and learner."""
     cost_limit: float = 30.0
-    """Cost limit of an episode."""
+    """Limit of the cost of an episode."""
     timesteps: int = 3_000_000
     """Environment steps of a training with the limit (quick: 8192)."""
     fast_timesteps: int = 1_000_000
@@ -78,7 +78,7 @@ class LimitedArguments(StudyArguments):
 
 
 def make_trainings(arguments: LimitedArguments) -> Trainings:
-    """Return the trainings of both learners."""
+    """Return the trainings of both learners for every seed."""
     limit, trainings = arguments.cost_limit, {}
     for seed in arguments.seeds:
         for name, timesteps, options in (
@@ -126,7 +126,7 @@ def name_row(learner: str, seed: int) -> str:
 
 
 def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[str, Metric]:
-    """Return how well each learner kept its limit, from its curve."""
+    """Compute from the learning curves how closely each learner kept its limit."""
     del metrics
     return {
         f"limited_{seed}.{name}": metric
@@ -139,17 +139,17 @@ def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[s
 
 
 def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[str, Metric]:
-    """Return how well a limit was kept.
+    """Compute how closely a training kept its limit.
 
     Args:
-        curve: points of a training.
+        curve: learning curve of the training.
         limit: limit of the cost of an episode.
-        n_windows: number of last windows that count.
+        n_windows: number of windows at the end that are evaluated.
 
     Returns:
-        Steps after which the smoothed cost first was near the whole limit (infinite: never), the
-            mean cost of the last windows, and the greatest deviation of one of them from the limit,
-            as a share.
+        Steps until the smoothed cost was first near the full limit (infinite if never), the mean
+            cost of the last windows, their maximum relative deviation from the limit, and their
+            goals per minute.
     """
     whole = (point for point in curve if point["safety_share"] == 1)
     near = (point["steps"] for point in whole if point["cost"] <= REACHED * limit)
@@ -169,13 +169,13 @@ def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies that are in a folder."""
+    """Return the study of the command, with the policies in a folder."""
     arguments = LimitedArguments(out)
     return make_study(make_trainings(arguments), arguments.cost_limit)
 
 
 def main() -> int:
-    """Train and evaluate policies, and print the report; return the exit status."""
+    """Train and evaluate policies, print the report, and return the exit status."""
     arguments = tyro.cli(LimitedArguments, description=__doc__)
     torch.set_num_threads(1)
     trainings = make_trainings(arguments)

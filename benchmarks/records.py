@@ -1,9 +1,9 @@
 """Summaries of finished parts of studies: `docs/results/parts/STUDY.json`.
 
-Parts themselves are large and stay in `out/`. A summary has, for each list of numbers in a part,
-five numbers that can be compared with those of another run: their count, the count of finite ones,
-their mean, their root mean square, and their mean with fixed weights, which depends on the order.
-If all numbers of two lists agree to a tolerance, relative to their size, so do these.
+The parts themselves are large and stay in `out/`. For each list of numbers in a part, a summary has
+five numbers that can be compared with those of another run: the count, the count of finite numbers,
+the mean, the root mean square, and a mean with fixed weights, which depends on the order. If two
+lists agree to a relative tolerance, their summaries agree to the same tolerance.
 """
 
 import json
@@ -18,12 +18,11 @@ import numpy as np
 from docs import tables
 
 TOLERANCE = 1e-6
-"""Greatest difference of a number up to 1 between two runs of a part; for larger numbers it is
-relative."""
+"""Maximum difference of a number between two runs of a part, relative for numbers above 1."""
 CLOCK = frozenset({"t"})
-"""Keys of numbers in parts that depend on a clock, which differ in every run."""
+"""Keys of times in parts, which differ in every run."""
 Summary = dict[str, list[float]]
-"""Five numbers by the path of a list in a part: keys, with * for each position in a list."""
+"""Five numbers of each list in a part, by its path: keys, with * for each position in a list."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +30,11 @@ class Part:
     """The record of a finished part."""
 
     key: str
-    """Key of the settings and versions from which it was made."""
+    """Key of the settings and versions with which the part was computed."""
     seconds: float
-    """Time that it took [s]."""
+    """Computing time of the part [s]."""
     notes: Mapping[str, float]
-    """Numbers that a replay needs besides its label (`PartCache.make_part`)."""
+    """Numbers besides the label that a replay needs (`PartCache.make_part`)."""
     summary: Summary
     """Summary of its numbers."""
 
@@ -45,11 +44,11 @@ class Record:
     """The record of a study's parts."""
 
     depends: Mapping[str, int] = field(default_factory=dict)
-    """Versions at which the parts were made."""
+    """Versions of the subsystems with which the parts were computed."""
     parts: Mapping[str, Part] = field(default_factory=dict)
     """Parts by label."""
     spoiled: Mapping[str, str] = field(default_factory=dict)
-    """Labels of parts that differed in a replay, with descriptions of the differences."""
+    """Descriptions of the differences of parts in a replay, by label."""
 
 
 def get_path(study: str) -> Path:
@@ -68,14 +67,14 @@ def read(study: str) -> Record:
 
 
 def write(study: str, depends: Mapping[str, int], folder: Path, began_s: float) -> None:
-    """Write the record of a study from the parts that its latest run made or used.
+    """Write the record of a study from the parts that its latest run computed or reused.
 
     Args:
         study: name of the study.
-        depends: versions of the subsystems that it depends on.
-        folder: folder of its parts; without any there is no record.
-        began_s: start of the run, as of `time.time` [s]; parts that were last used before are left
-            out.
+        depends: versions of the subsystems on which it depends.
+        folder: folder of its parts; if it has none, the record is deleted.
+        began_s: start of the run in the time of `time.time` [s]; parts that were last used before
+            it are left out.
     """
     made = [path for path in sorted(folder.glob("*.json")) if path.stat().st_atime >= began_s - 1]
     parts = {}
@@ -115,12 +114,12 @@ class Leaf(NamedTuple):
     """A number in a part."""
 
     path: str
-    """Keys that lead to it, with * for each position in a list."""
+    """Keys that lead to the number, with * for each position in a list."""
     value: float
 
 
 def _list_leaves(value: Any, path: str) -> Iterator[Leaf]:
-    """Yield every number of a part with its path; strings are replaced by a checksum."""
+    """Yield every number of a part with its path; a string is replaced by its checksum."""
     if isinstance(value, Mapping):
         for key, item in value.items():
             if key not in CLOCK:
@@ -143,7 +142,7 @@ def _summarize_list(values: np.ndarray) -> list[float]:
 
 
 def describe_difference(recorded: Summary, current: Summary) -> str:
-    """Return a description of the first difference between two summaries; "" if there is none."""
+    """Describe the first difference between two summaries, or return "" if there is none."""
     for path in dict.fromkeys([*recorded, *current]):
         if path not in current:
             return f"{path} is missing"

@@ -1,9 +1,9 @@
 """Replays of the parts of each study, with the settings of its command.
 
-A replay plays an experiment unchanged with a cache (`benchmarks.verify.ReplayCache`) that computes
-the parts that were drawn and returns an empty one for each of the others, so no code here depends
-on the content of a part. Replays that need a trained policy use the one in the study's folder, and
-leave out its parts if there is none.
+A replay plays an unchanged experiment with a cache (`benchmarks.verify.ReplayCache`) that computes
+the parts that were drawn, and returns an empty part for each of the others. This code does not
+depend on the content of parts. Replays that need a trained policy use the one in the study's
+folder, and leave out its parts if there is none.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,28 +22,27 @@ class ReplayInput:
     """The input of a replay."""
 
     cache: PartCache
-    """The cache from which parts are requested."""
+    """Cache from which the experiment requests its parts."""
     out: Path
-    """Folder of the study, which may contain policies."""
+    """Folder of the study, which may contain trained policies."""
     notes: Mapping[str, Mapping[str, float]]
     """Notes of the parts that were drawn, by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """The replay of a study, and the kinds of its parts."""
+    """The replay of a study, with labels of special kinds of parts."""
 
     walk: Callable[[ReplayInput], None]
-    """Requests every part from the cache."""
+    """Function that requests every part of the study from the cache."""
     timed: tuple[str, ...] = ()
-    """Beginnings of the labels of parts that contain measured times."""
+    """Prefixes of labels of parts that contain measured times."""
     trainings: tuple[str, ...] = ()
-    """Labels of parts that are trainings; one that ends with a point stands for all that begin with
-    it."""
+    """Labels of parts that are trainings; one that ends with a dot is a prefix of labels."""
     learnt: tuple[str, ...] = ()
-    """Words in the labels of parts that need a file of a training."""
+    """Substrings of labels of parts that need a file of a training."""
     row_words: int = 1
-    """Number of words at the beginning of a label that name its row."""
+    """Number of words at the beginning of a label that identify its row."""
 
     def is_training(self, label: str) -> bool:
         """Return whether a part is a training."""
@@ -52,7 +51,7 @@ class Replay:
         )
 
     def is_repeatable(self, label: str) -> bool:
-        """Return whether a part is the same in every run: no training, no measured times."""
+        """Return whether a part is the same in every run, without training and measured times."""
         return not (self.is_training(label) or label.startswith(self.timed))
 
     def is_learnt(self, label: str) -> bool:
@@ -125,10 +124,10 @@ REPLAYS: dict[str, Replay] = {
     "price": Replay(partial(_replay_price, "price"), row_words=2),
     "frontier": Replay(partial(_replay_price, "frontier"), row_words=2),
 }
-"""Replays by command; a command that is missing here keeps no parts."""
+"""Replays by command; commands without parts have none."""
 
 
 def find_row(name: str, label: str) -> str:
-    """Return the row of a study's part: the first words of its label."""
+    """Return the row of a part, the first words of its label."""
     n_words = REPLAYS[name].row_words if name in REPLAYS else 1
     return ".".join(label.split(".")[:n_words])

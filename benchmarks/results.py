@@ -1,10 +1,11 @@
 """Regenerate every number and picture of the documentation.
 
-Runs the studies that are older than the subsystems they depend on (`behaviour.toml`), one after the
-other; writes their numbers into `docs/results/whole/`, their pictures into `docs/pictures/`, both
-into the pages, and a summary of every part into `docs/results/parts/`, with which
-`benchmarks.verify` compares replays. Finished parts of a study stay in `out/results/`, and a run
-that was stopped continues there. Numbers come from a clean commit; changes in `docs/` do not count.
+This command runs the studies that are older than the subsystems on which they depend
+(`behaviour.toml`), one after the other. It writes their numbers to `docs/results/whole/`, their
+pictures to `docs/pictures/`, both into the pages, and a summary of every part to
+`docs/results/parts/`, with which `benchmarks.verify` compares replays. Finished parts of a study
+stay in `out/results/`, where a run that was stopped continues. It requires a clean commit, except
+for changes in `docs/`.
 
     python -m benchmarks.results --list            # stale studies, with the reason and the time
     python -m benchmarks.results --only site lab
@@ -42,32 +43,32 @@ from hrc_env.experiments.versions import select_versions
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
-"""Folders of the studies, and of their quick forms."""
+"""Folders for the output of studies, and of their quick forms."""
 WHOLE, PICTURES = tables.RESULTS / "whole", ROOT / "docs" / "pictures"
 """Folders of the published numbers and pictures."""
 MARK = "made_by.json"
-"""Name of the file in a study's folder with its versions, its time, and the start of its latest
-run."""
+"""Name of the file in a study's folder that records its versions, its time, and the start of its
+latest run."""
 STOPPING_S = 3.0
-"""Time that an interrupted command gets to stop before it is killed [s]."""
+"""Time after which an interrupted command is killed [s]."""
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Run stale studies again."""
+    """Run the stale studies again."""
 
     only: tuple[str, ...] = ()
     """Studies to run, even if they are fresh (default: all stale ones)."""
     list: bool = False
-    """Print the stale studies, with the reason and the time; run nothing."""
+    """Only print the stale studies, with reasons and times."""
     hours: float | None = None
     """Stop after this time; finished parts are kept."""
     quick: bool = False
-    """Run quick forms in out/results_quick, and check that every table finds its metrics there."""
+    """Run quick forms in out/results_quick, and check that they have the metrics of every table."""
     dirty: bool = False
-    """Run although there are uncommitted changes, which results record."""
+    """Run despite uncommitted changes, which are recorded in the results."""
     trainings: bool = False
-    """Include trainings of policies, which take hours and are only needed for a release."""
+    """Include trainings of policies, which take hours and are needed only for a release."""
 
 
 def main(arguments: Arguments) -> int:
@@ -119,18 +120,18 @@ def make_plan(stale: Mapping[str, str]) -> Table:
 
 
 def format_time(minutes: float) -> str:
-    """Return a time in minutes, or in hours if it is long."""
+    """Format a time in minutes, or in hours if it is long."""
     return f"{minutes:.0f} min" if minutes < 100 else f"{minutes / 60:.1f} h"
 
 
 def read_results(name: str) -> dict[str, Any]:
-    """Return the results of a command's last run; empty if there are none."""
+    """Return the published results of a command; they are empty if there are none."""
     path = WHOLE / f"{name}.json"
     return json.loads(path.read_text()) if path.exists() else {}
 
 
 def explain_stale(name: str) -> str:
-    """Return the changes since a study's numbers were made; "" if there are none."""
+    """Describe the changes since a study's numbers were computed; "" if there are none."""
     command, made = COMMANDS[name], read_results(name)
     before = made.get("depends")
     if before is None:
@@ -152,7 +153,7 @@ def explain_stale(name: str) -> str:
 
 
 def read_settings(name: str) -> dict[str, Any]:
-    """Return the settings of a command in the form of results.json; empty if it has none."""
+    """Return the settings of a command as in results.json; they are empty if it has none."""
     source = COMMANDS[name].made
     if source is None:
         return {}
@@ -160,10 +161,10 @@ def read_settings(name: str) -> dict[str, Any]:
 
 
 def list_changes(recorded: Mapping[str, Any], current: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the settings that have other values now: "n_seeds 10 -> 9".
+    """Yield the settings that have changed, e.g. "n_seeds 10 -> 9".
 
-    Settings that only one of them has are left out: a new one has the former behaviour as its
-    default, and a renamed one has kept its value.
+    Settings that exist in only one of the two are left out: the default of a new one is the former
+    behaviour, and the value of a renamed one is the same.
     """
     for name in recorded:
         if name not in current or recorded[name] == current[name]:
@@ -175,13 +176,13 @@ def list_changes(recorded: Mapping[str, Any], current: Mapping[str, Any]) -> Ite
 
 
 def _shorten(value: Any) -> str:
-    """Return a short text of a value."""
+    """Return a value as a text of limited length."""
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 24 else f"{text[:20]} ..."
 
 
 def describe_source(name: str) -> dict[str, Any]:
-    """Return the command and the versions with which a study's parts in `out/` must be made."""
+    """Return the command and the versions that the parts of a study in `out/` must have."""
     command = COMMANDS[name]
     return {
         "command": command.command,
@@ -191,7 +192,7 @@ def describe_source(name: str) -> dict[str, Any]:
 
 
 def run(name: str, until_s: float) -> bool:
-    """Run a study until it is finished or the time is up; return whether it is finished.
+    """Run a command until it ends or the time is up; return whether it is finished.
 
     Raises:
         HRCError: the command failed.
@@ -216,10 +217,7 @@ def run(name: str, until_s: float) -> bool:
 
 
 def call(command: Command, out: Path, more: str, until_s: float = float("inf")) -> int | None:
-    """Call a study's command; return its status.
-
-    It is None if the time was up and the study was stopped.
-    """
+    """Call a command; return its exit status, or None if it was stopped because the time was up."""
     words = [sys.executable, *command.command.split()[1:], *more.split()]
     words += ["--out", str(out)] if command.tables else []
     release_folder(out)  # settings may have changed; parts have their keys
@@ -239,7 +237,7 @@ def call(command: Command, out: Path, more: str, until_s: float = float("inf")) 
 
 
 def publish(name: str) -> None:
-    """Write a finished study's numbers and pictures into the documentation."""
+    """Copy the numbers and pictures of a finished command into the documentation."""
     command, out = COMMANDS[name], OUT / name
     content = json.loads((out / "results.json").read_text()) if command.tables else provenance()
     mark = json.loads((out / MARK).read_text())
@@ -267,7 +265,7 @@ def publish(name: str) -> None:
 
 
 def format_results(content: Mapping[str, Any]) -> str:
-    """Return the text of a file of `docs/results/whole/`, with one line per metric."""
+    """Format results for a file in `docs/results/whole/`, with one line per metric."""
     parts = []
     for name, value in content.items():
         text = json.dumps(value, ensure_ascii=False)
@@ -283,10 +281,7 @@ def format_results(content: Mapping[str, Any]) -> str:
 
 
 def try_out(console: Console, name: str) -> int:
-    """Run a study's quick form; return 0 if it makes all that the documentation needs.
-
-    That is every metric and every picture.
-    """
+    """Run the quick form of a command; return 0 if it yields all required metrics and pictures."""
     command, out, started_s = COMMANDS[name], QUICK_OUT / name, time.monotonic()
     if status := call(command, out, command.quick):
         console.print(f"{name}: ended with status {status}")

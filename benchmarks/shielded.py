@@ -2,8 +2,8 @@
 
     python -m benchmarks.shielded
 
-Goals, contacts and cost of the scripted reacher, which drives to its goals and ignores people,
-beside people who ignore it: without a shield, and with `qp` and the perception of each row.
+Goals, contacts and cost are measured for the scripted reaching agent, which ignores people, beside
+people who ignore the robot: without a shield, and with the shield `qp` and several perceptions.
 """
 
 import sys
@@ -18,7 +18,7 @@ from hrc_env.perception.faults.fault import ALL, FaultConfig
 from hrc_env.safety.incidents import KINDS
 
 BLIND = (FaultConfig("lost", (ALL,), None, 3.0, 6.0),)
-"""Loss of all cameras for some time."""
+"""Fault in which all cameras are lost from 3 to 6 s."""
 
 
 def _make_row(
@@ -29,7 +29,7 @@ def _make_row(
     baseline: str = "bare",
     **env: Any,
 ) -> Row:
-    """Return a row beside people who ignore the robot."""
+    """Return a row of the study, with workers that ignore the robot."""
     known = {"people": "unaware", "shield": shield, **env}
     return Row(words, n_episodes, "scripted", setup, known, baseline, is_shown=words != "")
 

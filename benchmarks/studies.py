@@ -1,7 +1,7 @@
-"""The studies behind the numbers and pictures of the documentation, and their commands.
+"""The studies that produce the numbers and pictures of the documentation, and their commands.
 
-A study is measured at once; its commands are called one after the other, and each keeps its results
-under its own name. Properties that need no table are tests: `tests/properties/`.
+The commands of a study are run one after the other, and each stores its results under its own name.
+Properties that need no table are tested in `tests/properties/`.
 """
 
 from collections.abc import Collection, Mapping
@@ -16,21 +16,21 @@ from hrc_env.experiments.runner import Experiment
 from hrc_env.experiments.versions import check_subsystems
 
 EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m benchmarks "
-"""Beginnings of commands."""
+"""Prefixes of command lines."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSource:
-    """The function that makes the experiment of a command, with the command's settings."""
+    """The function that creates the experiment of a command, with the settings of the command."""
 
     module: str
     """Name of the module."""
     name: str = "make_study"
-    """Name of a function that makes the experiment; or "STUDY", the experiment itself."""
+    """Name of a function that creates the experiment, or "STUDY" for the experiment itself."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Arguments of the function."""
     needs_out: bool = False
-    """Whether the function takes the command's folder, which contains trained policies."""
+    """Whether the function's argument is the command's folder, which contains trained policies."""
 
     def make(self, out: Path) -> Experiment[Any]:
         """Return the experiment.
@@ -46,36 +46,36 @@ class ExperimentSource:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command, and the parts of the documentation that it makes."""
+    """A command, and the parts of the documentation that it produces."""
 
     command: str
     """The command line."""
     minutes: float
     """Budget of time on two cores [min]."""
     depends: tuple[str, ...]
-    """Subsystems that its numbers depend on (`behaviour.toml`)."""
+    """Subsystems on which its numbers depend (`behaviour.toml`)."""
     tables: tuple[str, ...] = ()
-    """Tables of the documentation that it fills, which its experiment declares."""
+    """Names of tables of the documentation that it fills and its experiment declares."""
     pictures: Mapping[str, str] = field(default_factory=dict)
-    """Pictures in `docs/pictures/`, with their files in the command's folder `figures`."""
+    """Names of pictures in `docs/pictures/`, with their files in the command's folder `figures`."""
     quick: str = "--quick"
-    """Option of the quick form; "": there is none."""
+    """Option of the quick form, or "" if there is none."""
     is_resumable: bool = True
-    """Whether it keeps finished parts when it is stopped."""
+    """Whether a stopped run keeps its finished parts."""
     made: ExperimentSource | None = None
-    """Its experiment; None: it has none."""
+    """Source of its experiment, or None if it has none."""
     tables_in: str = ""
-    """Module with the `TABLES` that it fills, if it has no experiment."""
+    """Name of the module that declares its `TABLES`, if it has no experiment."""
     is_release: bool = False
-    """Whether it only runs for a release, as it trains policies for hours."""
+    """Whether it runs only for a release, because it trains policies for hours."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` if no subsystem is named, or one does not exist."""
+        """Raise `ConfigError` if there is no subsystem, or one that does not exist."""
         check_subsystems(self.depends)
 
     @property
     def declared_tables(self) -> Mapping[str, Table]:
-        """The tables that are declared for it, by name."""
+        """Declarations of its tables, by name."""
         declared = import_module(self.tables_in).TABLES if self.tables_in else ()
         if self.made is not None:
             declared = getattr(self.made.make(Path()), "shown_tables", tuple)()
@@ -83,28 +83,28 @@ class Command:
 
 
 KEYPOINTS = ("env", "tracker", "emulator", "motion")
-"""Subsystems behind episodes at level `keypoints`."""
+"""Subsystems that affect episodes at level `keypoints`."""
 PIXELS = ("env", "tracker", "emulator", "detector", "motion")
-"""Subsystems behind episodes at level `pixels` and at all others."""
+"""Subsystems that affect episodes at level `pixels` and all other levels."""
 ALL = (*PIXELS, "shield", "agents")
 """All subsystems."""
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Commands that are called one after the other."""
+    """Commands that are run one after the other."""
 
     commands: Mapping[str, Command]
-    """Commands by name, which is also that of their files and folders of results."""
+    """Commands by name; their files and folders of results have the same names."""
 
     @property
     def minutes(self) -> float:
-        """Budget on two cores [min], without commands that only run for a release."""
+        """Budget of time on two cores [min], without commands that run only for a release."""
         return sum(each.minutes for each in self.commands.values() if not each.is_release)
 
 
 def _find_experiment(name: str, **options: Any) -> ExperimentSource:
-    """Return the source of an experiment of the library, with options of its command."""
+    """Return the source of an experiment of the package, with the options of its command."""
     module = f"hrc_env.experiments.{name}.experiment"
     return ExperimentSource(module, "make_experiment", options)
 
@@ -237,10 +237,10 @@ COMMANDS: dict[str, Command] = {
 
 
 def list_commands(names: Collection[str]) -> tuple[str, ...]:
-    """Return the names of commands in order, for names of studies and of commands.
+    """Return the names of all commands for names of studies and of commands, in order.
 
     Raises:
-        ConfigError: a name is neither.
+        ConfigError: a name is neither a study nor a command.
     """
     check_names("study", names, {**STUDIES, **COMMANDS})
     groups = [

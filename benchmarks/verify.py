@@ -1,12 +1,12 @@
-"""Check that recorded numbers are reproduced.
+"""Check that recorded numbers can be reproduced.
 
-Replays a share of all recorded parts, drawn at random, and at least one of every row of parts
-(parts with labels that begin with the same words: a scene, a task, a perception setup), and
-compares them with `docs/results/parts/`. For a training the evaluation of its policy is replayed,
-if the policy is on this machine. A part that differs makes its study stale: `python -m
-benchmarks.results --list` reports it, and the next `make results` computes all of its parts again.
+This command replays a random share of all recorded parts, with at least one of every row of parts
+(labels that begin with the same words, such as a scene, a task or a perception setup), and compares
+them with `docs/results/parts/`. Of a training, the evaluation of its policy is replayed if the
+policy is on this machine. A part that differs makes its study stale: `python -m benchmarks.results
+--list` reports it, and the next `make results` computes all parts of the study again.
 
-    python -m benchmarks.verify                      # 2 % of all parts, with the day's seed
+    python -m benchmarks.verify                      # 2 % of all parts, with the seed of the day
     python -m benchmarks.verify --only site lab --share 1 --longest 60
     python -m benchmarks.verify --strict             # also fails if there are no records
 """
@@ -40,9 +40,9 @@ from hrc_env.core.results import write_whole
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 
 CONFIDENCE = 0.95
-"""Probability with which a draw finds a spoiled part."""
+"""Probability with which a draw should contain a spoiled part."""
 LACKING = (DownloadError, MissingExtraError, RenderingError)
-"""Errors of a machine that lacks something, which do not concern a part."""
+"""Errors due to missing software or downloads, which do not count as differences of a part."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class Arguments:
     seed: int | None = None
     """Seed of the draw (default: the date as a number)."""
     longest: float = 5.0
-    """Time of a part [min] above which it is left out, and listed."""
+    """Maximum time of a part [min]; longer ones are listed, but not replayed."""
     strict: bool = False
     """Also fail if a study has no recorded parts, or parts that cannot be replayed here."""
     out: Path = Path("out/verify.json")
     """File for the outcome."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid, or a study does not exist."""
         if not 0 <= self.share <= 1:
             raise ConfigError(f"--share must be in [0, 1], got {self.share}.")
         if not self.longest > 0:
@@ -73,7 +73,7 @@ class Arguments:
 
 @dataclass(slots=True)
 class Outcome:
-    """The outcome of a run."""
+    """The outcome of a verification."""
 
     seed: int
     """Seed of the draw."""
@@ -84,27 +84,27 @@ class Outcome:
     drawn: dict[str, list[str]] = field(default_factory=dict)
     """Labels of the parts that were drawn, by study."""
     spoiled: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Labels of parts that differ, by study, with descriptions of the differences."""
+    """Descriptions of the differences of parts, by study and label."""
     skipped: dict[str, str] = field(default_factory=dict)
-    """Studies without replayed parts, with the reasons."""
+    """Reasons why no part of a study was replayed, by study."""
     lacking: dict[str, list[str]] = field(default_factory=dict)
     """Labels of parts that were drawn but cannot be replayed on this machine, by study."""
     too_long: dict[str, list[str]] = field(default_factory=dict)
-    """Labels of parts that were left out of the draw, by study."""
+    """Labels of parts that take too long and were left out of the draw, by study."""
     finds_share: float | None = None
-    """Least share of spoiled parts, at any positions, of which one is found in 95 of 100 runs."""
+    """Minimum share of spoiled parts, at any positions, that is detected in 95 % of runs."""
     finds_scattered_share: float | None = None
-    """The same share for spoiled parts that are scattered at random over all rows."""
+    """The same share if the spoiled parts are scattered at random over all rows."""
     seconds: float = 0.0
-    """Time of the run [s]."""
+    """Duration of the run [s]."""
 
 
 class AllReplayed(Exception):  # noqa: N818  ends a replay, is not an error
-    """Signal that all drawn parts of a study have been replayed."""
+    """Exception that ends a replay when all drawn parts of a study have been replayed."""
 
 
 class Unplayed(dict[str, Any]):
-    """A part that was not drawn: an empty list under every key."""
+    """A part that was not drawn, with an empty list under every key."""
 
     def __missing__(self, key: str) -> list[Any]:
         return []
@@ -112,16 +112,16 @@ class Unplayed(dict[str, Any]):
 
 @dataclass(frozen=True, slots=True)
 class ReplayCache(PartCache):
-    """A cache that computes the drawn parts, and compares them with the records."""
+    """A cache that computes the drawn parts again and compares them with their records."""
 
     drawn: Mapping[str, records.Part]
     """Records of the drawn parts, by label."""
     left: set[str]
     """Labels of parts that are still to be replayed."""
     spoiled: dict[str, str]
-    """Labels of parts that differ, with descriptions of the differences."""
+    """Descriptions of the differences of parts, by label."""
     is_training: Callable[[str], bool]
-    """Returns whether the part of a label is a training, which is returned from its file."""
+    """Function that returns whether a label is of a training, which is read from its file."""
 
     def make_part(
         self,
@@ -130,10 +130,10 @@ class ReplayCache(PartCache):
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Compute and compare a part if it was drawn; else return an empty one.
+        """Compute and compare a part if it was drawn; otherwise return an empty one.
 
         Raises:
-            AllReplayed: it was the last.
+            AllReplayed: it was the last part that was drawn.
         """
         del notes
         if label not in self.left:
@@ -155,7 +155,7 @@ class ReplayCache(PartCache):
         return replayed.part
 
     def make_parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
-        """Return the parts of `make_part`, one after the other."""
+        """Call `make_part` for each part, one after the other."""
         del one_core
         return [self.make_part(part.label, part.make, part.key, part.notes) for part in parts]
 
@@ -165,7 +165,7 @@ class ReplayedPart(NamedTuple):
 
     part: dict[str, Any]
     difference: str
-    """Description of its difference from the record; "" if there is none."""
+    """Description of its difference from the record, or "" if there is none."""
 
 
 def _replay_part(
@@ -219,7 +219,7 @@ def main(arguments: Arguments) -> int:
 
 
 def explain_skip(name: str, record: records.Record) -> str:
-    """Return the reason why no part of a study can be replayed; "" if one can."""
+    """Return the reason why no part of a study can be replayed, or "" if a part can."""
     if name not in REPLAYS:
         return "it keeps no parts; only a whole run verifies its numbers"
     if why := results.explain_stale(name):
@@ -230,7 +230,7 @@ def explain_skip(name: str, record: records.Record) -> str:
 
 
 class Candidates(NamedTuple):
-    """The parts of studies, by whether they can be drawn."""
+    """The parts of studies that can be drawn, and those that take too long."""
 
     choices: dict[tuple[str, str], float]
     """Times of parts that can be drawn, by study and label [s]."""
@@ -239,7 +239,7 @@ class Candidates(NamedTuple):
 
 
 def list_candidates(able: Mapping[str, records.Record], longest_s: float) -> Candidates:
-    """Return the parts that can be drawn, and those that take too long."""
+    """Split the repeatable parts into those that can be drawn and those that take too long."""
     choices, too_long = dict[tuple[str, str], float](), dict[str, list[str]]()
     for name, record in able.items():
         for label, part in record.parts.items():
@@ -257,15 +257,15 @@ class Draw(NamedTuple):
     drawn: dict[str, list[str]]
     """Labels by study."""
     n_anywhere: int
-    """Number of parts that were drawn with equal probability."""
+    """Number of parts that were drawn from all parts with equal probability."""
 
 
 def draw(choices: Mapping[tuple[str, str], float], share: float, rng: np.random.Generator) -> Draw:
-    """Draw a share of all parts, then one of every row that has none.
+    """Draw a share of all parts, then one of every row of which none has been drawn.
 
     Args:
-        choices: times of the parts [s], by study and label. The first draw has equal probabilities;
-            the second prefers parts that are replayed quickly.
+        choices: times of the parts [s], by study and label. The first draw has equal probabilities,
+            while the second prefers parts that are replayed quickly.
         share: share of all parts.
         rng: random generator.
     """
@@ -289,7 +289,7 @@ def draw(choices: Mapping[tuple[str, str], float], share: float, rng: np.random.
 def replay(
     name: str, record: records.Record, labels: Sequence[str], outcome: Outcome, console: Console
 ) -> None:
-    """Replay parts of a study, and mark those that differ in its record."""
+    """Replay parts of a study, and mark those that differ as spoiled in its record."""
     study, out = REPLAYS[name], results.OUT / name
     drawn = {label: record.parts[label] for label in labels}
 
@@ -318,11 +318,11 @@ def replay(
 
 
 def compute_found_share(n_parts: int, n_drawn: int) -> float | None:
-    """Return the least share of spoiled parts of which a draw finds one with 95 %.
+    """Return the minimum share of spoiled parts that a draw detects with a probability of 95 %.
 
-    `n_drawn` of `n_parts` parts are drawn with equal probability and without repetition, so the
-    number of spoiled parts among them is hypergeometric. None: no share is found with that
-    probability.
+    `n_drawn` of `n_parts` parts are drawn with equal probability and without replacement, which
+    makes the number of spoiled parts among them hypergeometric. The result is None if no share is
+    detected with that probability.
     """
     for n_spoiled in range(1, n_parts + 1):
         if 1 - hypergeom.pmf(0, n_parts, n_spoiled, n_drawn) >= CONFIDENCE:
@@ -331,7 +331,7 @@ def compute_found_share(n_parts: int, n_drawn: int) -> float | None:
 
 
 def describe(outcome: Outcome) -> list[str]:
-    """Return lines that describe an outcome."""
+    """Return sentences that describe an outcome."""
     lines = []
     for name, labels in outcome.lacking.items():
         lines.append(f"{name}: {', '.join(labels)} not replayed, as this machine lacks something "

@@ -30,7 +30,7 @@ from PIL import Image
 from benchmarks.gallery.still import views
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import make_expert
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import pinhole, project, projections
@@ -124,12 +124,12 @@ def faults() -> None:
         env.reset(seed=SEED_WALK)
         for _ in range(STEPS_WALK - 1):
             env.step(np.zeros(6))
-        scene, before = env.simulation.scene, copied(env.views.pose())
+        scene, before = env.simulation.scene, copy_arrays(env.views.pose())
         env.step(np.zeros(6))
         renderer = CropRenderer(scene)
         schedule = Schedule(scene.rig, tuple(given), env.config.ctrl_dt)
         film = CameraFilm(LensRenderer(renderer, scene.cameras), schedule)
-        now = copied(env.views.pose())
+        now = copy_arrays(env.views.pose())
         shot = Shot(0, ScenePose(*now), ScenePose(*before), scene.cameras)
         film.show([shot] * 4, seed=4)
         joints = env.simulation.estimate.mean_world[:, 0]

@@ -146,8 +146,8 @@ unknown; at level `none` every slot is.
 
 The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that
 a lost track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at
-no more than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent, it moves
-freely.
+no more than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent,
+it moves freely.
 
 ## Reward
 The reward is the sum of the task's terms and of terms that all tasks share, as float64. Each is in

@@ -12,7 +12,7 @@ from importlib.metadata import version
 
 from hrc_env import __version__
 from hrc_env.cli.entry import import_first, run_command, show_errors
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
@@ -121,7 +121,7 @@ def _run(name: str, *words: str) -> int:
     if name in MOVED:
         raise ConfigError(f"{name} is, in a clone of the repository: {MOVED[name]}")
     if name not in COMMANDS:
-        raise unknown("command", name, COMMANDS)
+        raise make_unknown_name_error("command", name, COMMANDS)
     module, command, _ = COMMANDS[name]
     return run_command(getattr(import_module(module), command), words, f"{PROGRAM} {name}")
 

@@ -15,9 +15,9 @@ from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import (
     PRESETS,
     answer_unknown_fields,
+    convert_to_plain,
     from_mapping,
     merge,
-    plain,
     read_toml,
     to_toml,
 )
@@ -164,4 +164,4 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
     for motion in config.motion.motions:
         if not isinstance(motion, str):
             raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")
-    write_whole(Path(path), to_toml(plain(asdict(config))))
+    write_whole(Path(path), to_toml(convert_to_plain(asdict(config))))

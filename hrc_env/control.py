@@ -14,8 +14,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.core.batching import flat
-from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
+from hrc_env.core.batching import flatten_axes
+from hrc_env.core.errors import ConfigError, check_fields, check_shape, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
@@ -74,7 +74,7 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
         ConfigError: `control` is unknown, or is not supported by a robot with slides.
     """
     if control not in CONTROLS:
-        raise unknown("control", control, CONTROLS)
+        raise make_unknown_name_error("control", control, CONTROLS)
     if control != "joint" and chain.slides.any():
         raise ConfigError(
             f"control={control!r} moves the tool of an arm of hinges; this robot has slides, as "
@@ -166,8 +166,8 @@ def resolve_rate(
     """
     pull = np.asarray(config.posture_gain_hz * (q_rest - q), float)
     pull[..., 0] = 0.0  # the first joint points the arm at its goal: leave it free
-    J, qd = flat(jacobian(chain, q), 2), flat(pull, 1)
-    velocity = flat(np.asarray(tool_velocity_world, float), 1)
+    J, qd = flatten_axes(jacobian(chain, q), 2), flatten_axes(pull, 1)
+    velocity = flatten_axes(np.asarray(tool_velocity_world, float), 1)
     _solve_damped(J, velocity, np.full(len(J), config.damping**2), qd)
     return _scale_to_limits(qd.reshape(pull.shape), chain)
 
@@ -188,11 +188,11 @@ def resolve_twist(
     Returns:
         (..., N) joint velocities [rad/s].
     """
-    J = flat(np.concatenate([jacobian(chain, q), angular_jacobian(chain, q)], axis=-2), 2)
+    J = flatten_axes(np.concatenate([jacobian(chain, q), angular_jacobian(chain, q)], axis=-2), 2)
     manipulability, qd = np.empty(len(J)), np.zeros((len(J), chain.n_joints))
     _measure_manipulability(J, manipulability)
     near = np.clip(1.0 - manipulability / SINGULAR_M3, 0.0, 1.0)
-    twist = flat(np.asarray(twist_world, float), 1)
+    twist = flatten_axes(np.asarray(twist_world, float), 1)
     _solve_damped(J, twist, np.square(config.damping * near) + 1e-9, qd)
     return _scale_to_limits(qd.reshape(np.shape(q)), chain)
 

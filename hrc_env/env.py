@@ -18,8 +18,13 @@ from numpy.typing import NDArray
 from hrc_env import observations, rewards
 from hrc_env.control import check_action
 from hrc_env.core.batching import Stateful, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
-from hrc_env.core.infos import Words, worded
+from hrc_env.core.errors import (
+    ConfigError,
+    NoAttributeError,
+    check_integer,
+    make_unknown_name_error,
+)
+from hrc_env.core.infos import Words, name_indices
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.env_config import signature_of_env
@@ -32,7 +37,7 @@ from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, check_size
 from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
-from hrc_env.settings import Settings, settle
+from hrc_env.settings import Settings, resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
@@ -162,7 +167,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     )
 
     def __init__(self, task: str | TaskType = DEFAULT, **arguments: Any) -> None:
-        settings = settle(task=task, **arguments)
+        settings = resolve_settings(task=task, **arguments)
         self._open(settings)
         rehearse(settings)
         self.simulation = Simulation(1, settings)
@@ -232,7 +237,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         Args:
             info: info that `reset` or `step` returned.
         """
-        return worded(info, words_of(self.body_names))
+        return name_indices(info, words_of(self.body_names))
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -395,7 +400,7 @@ def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
 
 def _steps_left(options: Mapping[str, Any]) -> int:
     """Return the number of remaining steps in the options of a reset."""
-    return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
+    return check_integer('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
 def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MODES) -> None:
@@ -407,7 +412,7 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
     if render_mode is not None and render_mode not in valid:
-        raise unknown("render_mode", render_mode, valid)
+        raise make_unknown_name_error("render_mode", render_mode, valid)
 
 
 def parse_overlays(markers: object, overlay: object) -> dict[str, bool]:
@@ -419,7 +424,7 @@ def parse_overlays(markers: object, overlay: object) -> dict[str, bool]:
     if not isinstance(markers, bool):
         raise ConfigError(f"render_markers must be True or False, got {markers!r}.")
     if overlay is not None and overlay not in OVERLAYS:
-        raise unknown("overlay", overlay, OVERLAYS)
+        raise make_unknown_name_error("overlay", overlay, OVERLAYS)
     return {"markers": markers, "capsules": overlay == "capsules"}
 
 

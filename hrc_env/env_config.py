@@ -10,7 +10,7 @@ from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields, for_json, read_toml, to_toml
 from hrc_env.core.results import write_whole
 from hrc_env.tasks import DEFAULT
@@ -187,4 +187,4 @@ def check_keywords(kind: type, given: Iterable[str], *inner: type) -> None:
     for name in given:
         if name not in names and name not in EnvConfig.__dataclass_fields__:
             valid = dict.fromkeys((*names, *(each.name for each in fields(EnvConfig))))
-            raise unknown(f"argument of {kind.__name__}", name, valid)
+            raise make_unknown_name_error(f"argument of {kind.__name__}", name, valid)

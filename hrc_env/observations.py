@@ -20,9 +20,9 @@ from hrc_env.belief import (
     standard_deviation_m,
 )
 from hrc_env.core.brought import check_arguments
-from hrc_env.core.errors import check_shape, needed
+from hrc_env.core.errors import check_shape, require
 from hrc_env.core.kernels import kernel
-from hrc_env.core.lending import called, is_of_user
+from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
@@ -122,17 +122,17 @@ def _hinges(belief: Belief, values: Floats) -> Floats:
 
 def _slides(belief: Belief, values: Floats) -> Floats:
     """Select the values of prismatic joints from those of all joints (B, N)."""
-    return values[:, needed(belief.robot.slides, "A slide")]
+    return values[:, require(belief.robot.slides, "A slide")]
 
 
 def _hand(belief: Belief) -> HandState:
     """Return the state of the hand; raise an error if there is none."""
-    return needed(belief.hand, "A hand")
+    return require(belief.hand, "A hand")
 
 
 def _objects(belief: Belief) -> ObjectState:
     """Return the state of the loose objects; raise an error if there are none."""
-    return needed(belief.objects, "A loose object")
+    return require(belief.objects, "A loose object")
 
 
 def _joints_forecast(belief: Belief) -> Floats:
@@ -424,7 +424,7 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
         bound=4.0,
         scale=1.0,
         doc="Joint velocities of the shield in the previous step, less those of the agent.",
-        function=lambda belief: needed(belief.shield_change, "What the shield changed"),
+        function=lambda belief: require(belief.shield_change, "What the shield changed"),
     ),
 )
 """Terms that are added if `HRCConfig.observe_shield` is true."""
@@ -497,7 +497,9 @@ def observe(
 def _value(term: ObservationTerm, belief: Belief) -> Floats:
     """Compute the value (B, ...) of a term; functions of users receive a read-only belief."""
     if is_of_user(term.function):
-        return called(f"Observation term {term.name!r}", term.function, lend_belief(belief))
+        return call_user_function(
+            f"Observation term {term.name!r}", term.function, lend_belief(belief)
+        )
     return term.function(belief)
 
 

@@ -46,13 +46,13 @@ def register_task(task: "TaskType") -> None:
         ConfigError: the ID is already in use, or a part of the task is missing or invalid.
     """
     from hrc_env.rehearsal import play_briefly  # here, because importing kernels takes time
-    from hrc_env.settings import settle
+    from hrc_env.settings import resolve_settings
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
     from hrc_env.together import check_rows
 
     check_task(task)
-    settings = settle(task=task, perception="none")
+    settings = resolve_settings(task=task, perception="none")
     play_briefly(settings)
     check_rows(settings)
     _add(TASKS, task.id, task)
@@ -276,12 +276,12 @@ class Spec(EnvSpec):
 
 def make_spec(spec: EnvSpec) -> Spec:
     """Return a specification with plain arguments, in which names replace registered objects."""
-    from hrc_env.core.mapping import plain
+    from hrc_env.core.mapping import convert_to_plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS
     from hrc_env.tracking.estimators import ESTIMATORS
 
-    given = plain(spec.kwargs)
+    given = convert_to_plain(spec.kwargs)
     tables = {"task": TASKS, "estimator": ESTIMATORS, "shield": SHIELDS}
     for name in tables.keys() & given.keys():
         given[name] = tables[name].name_of(given[name]) or given[name]

@@ -9,8 +9,14 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
-from hrc_env.core.mapping import restored
+from hrc_env.core.errors import (
+    ConfigError,
+    check_integer,
+    check_names,
+    check_shape,
+    make_unknown_name_error,
+)
+from hrc_env.core.mapping import convert_to_hint
 from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.chains import SerialChain
@@ -99,9 +105,9 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
     given, valid = dict(options or {}), tuple(dict.fromkeys((*NAMES, *more)))
     for name in given:
         if name in OF_SEVERAL and name not in valid:
-            raise unknown("reset option of one environment", name, valid)
+            raise make_unknown_name_error("reset option of one environment", name, valid)
         if name not in valid:
-            raise unknown("reset option", name, valid)
+            raise make_unknown_name_error("reset option", name, valid)
     return {name: value for name, value in given.items() if value is not None}
 
 
@@ -275,7 +281,7 @@ def _cast(given: Options, room: Room) -> Cast | None:
     most, n = room.scene.n_workers, None
     if "n_workers" in given:
         try:
-            n = whole('options["n_workers"]', given["n_workers"], 0, most)
+            n = check_integer('options["n_workers"]', given["n_workers"], 0, most)
         except ConfigError as error:
             raise ConfigError(
                 f"{error} The environment was made for {most}: make it with "
@@ -323,7 +329,7 @@ def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
     """Return the behaviour parameters for the option `people`; None without the option."""
     if people is None:
         return None
-    config = replace(mind.config, people=restored(PeopleConfig, people, "people"))
+    config = replace(mind.config, people=convert_to_hint(PeopleConfig, people, "people"))
     return replace(
         mind, config=config, hand_params=make_hand_params(config, mind.hand_params.robot_xy_m)
     )
@@ -337,7 +343,7 @@ def _rig(cameras: Any, room: Room) -> ChosenRig:
         cameras = cameras.tolist()
     rigs = None
     if isinstance(cameras, RigDistribution | Mapping):
-        rigs = restored(RigDistribution, cameras, "cameras")
+        rigs = convert_to_hint(RigDistribution, cameras, "cameras")
         rig = rigs.rig or room.scene.rig
         rigs.counts(len(rig))
         if room.level in CAMERA_LEVELS:  # to raise its errors early
@@ -363,7 +369,9 @@ def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
     """Return the faults in options; None without the option."""
     if "faults" not in given:
         return None
-    faults: tuple[FaultConfig, ...] = restored(tuple[FaultConfig, ...], given["faults"], "faults")
+    faults: tuple[FaultConfig, ...] = convert_to_hint(
+        tuple[FaultConfig, ...], given["faults"], "faults"
+    )
     return faults
 
 
@@ -371,7 +379,9 @@ def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
     """Return the appearance in options; None without the option."""
     if "appearance" not in given:
         return None
-    appearance: AppearanceConfig = restored(AppearanceConfig, given["appearance"], "appearance")
+    appearance: AppearanceConfig = convert_to_hint(
+        AppearanceConfig, given["appearance"], "appearance"
+    )
     return appearance
 
 

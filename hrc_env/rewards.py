@@ -13,7 +13,7 @@ from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.lending import called, is_of_user, read_only
+from hrc_env.core.lending import call_user_function, is_of_user, read_only
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 
@@ -142,7 +142,7 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
         "proximity",
         "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
         "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; the square "
-        "counts as at least `unknown` while a worker is unknown.",
+        "counts as at least `unknown_closeness` while a worker is unknown.",
         _proximity,
     ),
 )
@@ -167,7 +167,9 @@ def evaluate_terms(
     for term in terms:
         if is_of_user(term.function):
             lent = lend_belief(belief), *read_only((step, previous_action)), weights
-            values[term.name] = called(f"Reward term {term.name!r}", term.function, *lent)
+            values[term.name] = call_user_function(
+                f"Reward term {term.name!r}", term.function, *lent
+            )
         else:
             values[term.name] = term.function(belief, step, previous_action, weights)
     return values

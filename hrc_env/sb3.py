@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import OrderEnforcing, TimeLimit
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, check_shape, learner, whole
+from hrc_env.core.errors import ConfigError, check_integer, check_shape, learner
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.env import ENDLESS
 from hrc_env.env_config import check_keywords
@@ -247,7 +247,7 @@ class HRCVecEnv(VecEnv):
     def _choose(self, indices: Any) -> list[int]:
         """Return the indices of the chosen environments; negative indices count from the end."""
         n = self.num_envs
-        return [whole("indices", k, -n, n - 1) % n for k in self._get_indices(indices)]
+        return [check_integer("indices", k, -n, n - 1) % n for k in self._get_indices(indices)]
 
     def _member(self, k: int) -> "MonitoredMember":
         """Return a handle of environment `k`."""

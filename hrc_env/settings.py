@@ -9,7 +9,7 @@ import numpy as np
 
 from hrc_env.config import HRCConfig, resolve
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.mapping import restored
+from hrc_env.core.mapping import convert_to_hint
 from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig, parse_camera, read_rig
 from hrc_env.safety.shield import Shield, find_shield
@@ -94,7 +94,7 @@ class Settings:
         }
 
 
-def settle(**arguments: Any) -> Settings:
+def resolve_settings(**arguments: Any) -> Settings:
     """Return checked settings for keyword arguments of an environment, like `make_settings`."""
     return make_settings(EnvConfig(**arguments))
 
@@ -116,7 +116,7 @@ def make_settings(asked: EnvConfig) -> Settings:
         cameras = cameras.tolist()
     rigs = None
     if isinstance(cameras, RigDistribution | Mapping):
-        rigs = restored(RigDistribution, cameras, "cameras")
+        rigs = convert_to_hint(RigDistribution, cameras, "cameras")
         cameras = rigs.rig or None
     if (rig := rig_of(cameras)) is not None:
         config, cameras = replace(config, scene=replace(config.scene, cameras=rig)), None
@@ -213,5 +213,5 @@ def _with_part(record: RecordT, path: str, value: object, argument: str) -> Reco
     if rest:
         new = _with_part(getattr(record, name), rest, value, argument)
     else:
-        new = restored(get_type_hints(type(record))[name], value, argument)
+        new = convert_to_hint(get_type_hints(type(record))[name], value, argument)
     return replace(record, **{name: new})  # type: ignore[type-var]

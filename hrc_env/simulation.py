@@ -15,9 +15,9 @@ import numpy as np
 from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.control import joint_command, max_command, n_actions
-from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
+from hrc_env.core.batching import State, Stateful, rows, select_streams, write_rows
 from hrc_env.core.declared import Records2
-from hrc_env.core.errors import ConfigError, check_shape, needed
+from hrc_env.core.errors import ConfigError, check_shape, require
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
@@ -452,7 +452,9 @@ class Simulation(Stateful):
         """Expose the cameras, update the estimates, measure objects, and return the belief."""
         ids, everyone = truth.ids, truth.ids is self._everyone
         self._expose(truth)
-        sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
+        sensor, tracker = (
+            select_streams(self.streams[name], ids) for name in ("sensor", "tracker")
+        )
         estimate = self.pipeline.perceive(ids, sensor, tracker)
         later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
         estimates = (estimate, *later)
@@ -462,7 +464,7 @@ class Simulation(Stateful):
             for whole, part in zip(self.estimates, estimates, strict=True):
                 write_rows(whole, ids, part)
         if truth.world.objects is not None:
-            rngs = picked(self.streams[MEASURING], ids)
+            rngs = select_streams(self.streams[MEASURING], ids)
             measured = handling.measure_objects(truth.world.objects, rngs, self.config.objects)
             write_rows(self.measured, ids, measured)
         return self._believe(ids, truth.world, estimates)
@@ -521,7 +523,7 @@ class Simulation(Stateful):
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
         """Compute cost and metrics from the truth, and reward and observation from the belief."""
-        config, paths = self.config, needed(truth.paths, "A step's paths")
+        config, paths = self.config, require(truth.paths, "A step's paths")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)
@@ -552,7 +554,7 @@ class Simulation(Stateful):
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
         """Return the initial joint angles (n, N) of robots `ids` (n,), drawn or given."""
-        rngs = picked(self.streams["robot"], ids)
+        rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
         check_shape(f"{self.task.id}: draw_start", np.shape(q), expected, "an angle a joint")

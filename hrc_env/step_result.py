@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.infos import Info, InfoDict, published
+from hrc_env.core.infos import Info, InfoDict, publish
 from hrc_env.core.typing import Bools, Floats
 
 Observation = NDArray[np.float32] | dict[str, NDArray[Any]]
@@ -31,7 +31,7 @@ class StepResult:
 
     def info_of(self, b: int) -> InfoDict:
         """Return the info of one environment with NumPy scalars as values."""
-        return InfoDict({name: value[b] for name, value in published(self.info).items()})
+        return InfoDict({name: value[b] for name, value in publish(self.info).items()})
 
 
 def check_keys(keys: list[str], info: Info) -> Info:

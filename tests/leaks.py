@@ -17,7 +17,7 @@ import pytest
 from hrc_env import simulation
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.motion import generator, starts
 from hrc_env.pipeline.emulated import EmulatedCameras
 from hrc_env.pipeline.rendered import RenderedCameras
@@ -51,10 +51,10 @@ class Tape:
         def answer(*given: Any) -> Any:
             new, self.turn = ask(*given), self.turn + 1  # also when it plays: it draws numbers
             if not self.plays:
-                self.said.append(copied(new))
+                self.said.append(copy_arrays(new))
                 return new
             self.unlike |= bool(apart(self.said[self.turn - 1], new))
-            return copied(self.said[self.turn - 1])
+            return copy_arrays(self.said[self.turn - 1])
 
         return answer
 
@@ -123,7 +123,7 @@ def moment(env: Any) -> dict[str, Any]:
         found[f"belief {k}"] = fields_of(part.belief)
         found[f"pipeline {k}"] = {name: kept[name] for name in kept if name != "sensor"}
         found[f"windows {k}"] = part.pipeline.last_detections(0)[1]
-    return copied(found)
+    return copy_arrays(found)
 
 
 def played(

@@ -58,7 +58,7 @@ def test_every_task_has_an_agent_that_plays_it():
     done = hrc("play", "HRCPickPlace-v0", "--agent", "scripted", "--perception", "truth")
     assert done.returncode == 0, done.stderr
     assert "studs placed" in done.stdout
-    assert "studs left" in done.stdout
+    assert "studs remaining" in done.stdout
 
 
 def test_an_unknown_id_is_answered_without_a_traceback():

@@ -17,7 +17,7 @@ from hrc_env.motion.config import PEOPLE
 from hrc_env.motion.schedule import WORK
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.vector.env import HRCVectorEnv
 
 ODD = {
@@ -31,9 +31,9 @@ ODD = {
 
 @pytest.mark.parametrize("estimator", ["particle", "paper", "triangulation"])
 def test_a_config_that_is_saved_and_loaded_is_the_same(estimator, tmp_path):
-    config = settle(estimator=estimator, **ODD).config
+    config = resolve_settings(estimator=estimator, **ODD).config
     save_config(config, tmp_path / "mine.toml")
-    assert settle(estimator=estimator, config=tmp_path / "mine.toml").config == config
+    assert resolve_settings(estimator=estimator, config=tmp_path / "mine.toml").config == config
 
 
 def test_a_file_may_hold_a_few_changes_and_names_of_presets(tmp_path):
@@ -46,8 +46,10 @@ def test_a_file_may_hold_a_few_changes_and_names_of_presets(tmp_path):
 
 
 def test_a_keyword_argument_is_the_field_of_the_config_that_it_stands_for():
-    by_keyword = settle(**{name: value for name, value in ODD.items() if name != "config"}).config
-    by_config = settle(
+    by_keyword = resolve_settings(
+        **{name: value for name, value in ODD.items() if name != "config"}
+    ).config
+    by_config = resolve_settings(
         config={
             "scene": {"cameras": RIGS["lab_gopro"]},
             "motion": {"people": "hurried"},
@@ -82,21 +84,21 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
 def test_a_file_that_cannot_be_is_answered_with_what_would_do(text, said, tmp_path):
     (tmp_path / "mine.toml").write_text(text)
     with pytest.raises(ConfigError) as refused:
-        settle(config=tmp_path / "mine.toml")
+        resolve_settings(config=tmp_path / "mine.toml")
     assert said in str(refused.value)
 
 
 def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
     assert main(["list", "--config", "reward.proximity=0.5", "--people", "hurried"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
-    said = settle(people="hurried", config={"reward": {"proximity": 0.5}}).config
-    assert settle(config=tmp_path / "mine.toml").config == said
+    said = resolve_settings(people="hurried", config={"reward": {"proximity": 0.5}}).config
+    assert resolve_settings(config=tmp_path / "mine.toml").config == said
     assert main(["list", "--config", "motion.jobs=low_work"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
-    assert settle(config=tmp_path / "mine.toml").config.motion.jobs == WORK["low_work"]
+    assert resolve_settings(config=tmp_path / "mine.toml").config.motion.jobs == WORK["low_work"]
     assert main(["list", "--config"]) == 0
     (tmp_path / "mine.toml").write_text(capsys.readouterr().out)
-    assert settle(config=tmp_path / "mine.toml").config == settle().config
+    assert resolve_settings(config=tmp_path / "mine.toml").config == resolve_settings().config
 
 
 def test_the_environment_takes_the_fields_of_its_config():
@@ -125,7 +127,7 @@ def test_an_environment_is_made_of_its_arguments_from_a_file(tmp_path):
     [
         EnvConfig,
         HRCEnv,
-        settle,
+        resolve_settings,
         partial(HRCVectorEnv, 2),
         partial(gymnasium.make, "HRCReach-v0"),
         partial(gymnasium.make_vec, "HRCReach-v0", num_envs=2),

@@ -8,7 +8,7 @@ import hrc_env
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.infos import ENTRIES, entry_of, published
+from hrc_env.core.infos import ENTRIES, entry_of, publish
 from hrc_env.env import HRCEnv
 from hrc_env.vector.env import HRCVectorEnv
 
@@ -62,7 +62,7 @@ def test_what_was_not_measured_has_a_stand_in_beside_a_key_that_says_so():
     values = {
         name: np.array([np.nan, 2.0]) for name in ENTRIES if ENTRIES[name].stand_in is not None
     }
-    told = published({**values, "shield/own": np.array([np.nan, 1.0])})
+    told = publish({**values, "shield/own": np.array([np.nan, 1.0])})
     for name, value in values.items():
         entry = ENTRIES[name]
         assert told[name].tolist() == [entry.stand_in, value[1]]

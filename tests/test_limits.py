@@ -19,7 +19,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TRIED = (-np.inf, -1.0, 0.0, 1e-9, 0.5, 1.0, 1.0 + 1e-9, 2.0, 3.0, 10.0, 1e9, np.inf)
@@ -28,7 +28,7 @@ LIMITS = Path(__file__).with_name("limits.toml")
 
 def records() -> Iterator[Any]:
     """Yield one record of every type that holds settings."""
-    waiting: list[Any] = [settle(task=task, config={}).config for task in hrc_env.IDS]
+    waiting: list[Any] = [resolve_settings(task=task, config={}).config for task in hrc_env.IDS]
     waiting += [spec.config() for spec in ESTIMATORS.values() if spec.config is not None]
     waiting += [CameraConfig("camera_1", (2.9, 2.6, 2.45)), FaultConfig("noise", ("all",), 15.0)]
     waiting += [ShieldConfig("qp")]

@@ -23,7 +23,7 @@ from hrc_env.safety.shield import SHIELDS, apply_shield, find_shield
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import ROBOTS, make_chain
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 ARM, BASE = (make_chain(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
 
@@ -158,7 +158,7 @@ TIMING = FaultConfig("late", ("all",))
     [("truth", {}), ("none", {}), ("keypoints", {}), ("keypoints", {"faults": (TIMING,)})],
 )
 def test_a_level_is_taken_with_what_it_knows(level, changes):
-    make_pipeline(level, "particle", SCENE, 1, replace(settle().config, **changes))
+    make_pipeline(level, "particle", SCENE, 1, replace(resolve_settings().config, **changes))
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_images_may_look_different_and_have_faults(monkeypatch, changes):
             pass
 
     monkeypatch.setattr(levels, "PixelPipeline", Made)
-    config = replace(settle().config, **changes)
+    config = replace(resolve_settings().config, **changes)
     assert isinstance(make_pipeline("pixels", "particle", SCENE, 1, config), Made)
 
 
@@ -191,7 +191,7 @@ def test_images_may_look_different_and_have_faults(monkeypatch, changes):
 )  # fmt: skip
 def test_a_level_is_refused_with_what_it_does_not_know(level, changes, said):
     with pytest.raises(ConfigError, match=said):
-        make_pipeline(level, "particle", SCENE, 1, replace(settle().config, **changes))
+        make_pipeline(level, "particle", SCENE, 1, replace(resolve_settings().config, **changes))
 
 
 def test_truth_is_known_to_whom_it_is_told():

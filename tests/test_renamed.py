@@ -86,7 +86,7 @@ def test_a_former_key_of_infos_is_an_error_that_gives_the_present_one(former, pr
     with pytest.raises(KeyError, match=r"^'other'$"):
         info["other"]
     with pytest.raises(ConfigError, match=re.escape(expected)):
-        infos.matching([former], [present])
+        infos.match_keys([former], [present])
 
 
 def test_infos_of_resets_and_steps_answer_former_keys():

@@ -1,1 +1,1 @@
-"""PPO by RLlib: many processes and machines step environments, one learns."""
+"""PPO by RLlib, with environments on many processes and machines, and a single learner."""

@@ -28,11 +28,11 @@ from .policy_module import PolicyModule
 from .runner_env import RunnerEnv, make_envs, reported_errors
 
 ENVIRONMENT = "hrc_env"
-"""Name of our environments in RLlib."""
+"""Name with which the environments are registered in RLlib."""
 _LOGGER = logging.getLogger("ray.rllib")
-"""RLlib's log of failing workers; its lines would interrupt those of the progress."""
+"""RLlib's logger of failing workers; its lines would interrupt the progress display."""
 SEEDS_OF_RUN = 100_000
-"""Numbers of runners that a run may have, between the seeds of runs."""
+"""Difference between the seeds of successive runs, which must exceed the number of runners."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class RunnerSettings:
     """Settings of the processes that step environments."""
 
     keywords: Mapping[str, Any]
-    """Keywords of the environment, as of `gymnasium.make`, with the task."""
+    """Keyword arguments of `gymnasium.make`, and the task."""
     n: int
     """Number of runners."""
     num_envs: int
@@ -48,25 +48,25 @@ class RunnerSettings:
     seed: int
     """Seed of environments and of exploration."""
     share: float
-    """Share of a core that each runner counts as, if there are fewer cores than runners."""
+    """Share of a core that a runner reserves; below 1 if there are fewer cores than runners."""
     registrations: Registrations
-    """Registrations of this process, which the runners take over."""
+    """Registrations of this process, which are repeated in the runners."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """Data of an update."""
+    """Data that were sampled for an update."""
 
     n_steps: int
     """Environment steps."""
     episodes: list[dict[str, float]]
     """Statistics of the episodes that ended."""
     n_runners: int
-    """Number of living runners."""
+    """Number of runners that are alive."""
     n_restarts: int
-    """Number of runners that died and were restarted, so far."""
+    """Number of restarts of runners since the start of the run."""
     seconds: float
-    """Time of sampling and learning."""
+    """Duration of sampling and learning [s]."""
 
     def facts(self) -> dict[str, float]:
         """Return rates and counts for TensorBoard and Ray's metrics, by name."""
@@ -78,10 +78,10 @@ class Sampled:
 
 
 class RLlibPPO:
-    """Runners that step environments, and a learner on this machine.
+    """RLlib's PPO, with runners that step environments, and a learner on this machine.
 
     Args:
-        policy: policy whose network is trained; it does not change until `pull`.
+        policy: learner with the policy to train, which does not change until `pull`.
         settings: settings of PPO; a rollout has `n_steps` of every environment of every runner.
         runners: settings of the processes that step environments.
     """
@@ -109,7 +109,7 @@ class RLlibPPO:
             .env_runners(
                 num_env_runners=n,
                 num_envs_per_env_runner=num_envs,
-                num_cpus_per_env_runner=runners.share,  # type: ignore[arg-type]  # a share is one, too
+                num_cpus_per_env_runner=runners.share,  # type: ignore[arg-type]  # fractions are allowed
                 gym_env_vectorize_mode="vector_entry_point",
                 rollout_fragment_length=settings.n_steps,
                 create_env_on_local_worker=False,
@@ -148,7 +148,7 @@ class RLlibPPO:
         self.push()
 
     def _build(self, config: PPOConfig) -> Any:
-        """Start the runners; `HRCError` if none can make its environments."""
+        """Start the runners; raise `HRCError` if none can create its environments."""
         try:
             return config.build_algo()
         except Exception as error:  # of RLlib, which has no runner to ask for spaces
@@ -158,9 +158,9 @@ class RLlibPPO:
             raise
 
     def push(self) -> None:
-        """Copy the policy's network, Adam's moments and the scale of rewards.
+        """Copy the policy's network, Adam's moments and the scale of rewards to RLlib.
 
-        Learner and runners get them.
+        The learner receives the moments, the runners the scale, and both the network.
         """
         known = self.policy.policy
         weights, moments = known.state_dict(), known.optimizer.state_dict()
@@ -199,7 +199,7 @@ class RLlibPPO:
         return found
 
     def _each(self, do: Callable[[RunnerEnv], Any]) -> list[Any]:
-        """Return the results of a function of each living runner's environments."""
+        """Call a function with the environments of each living runner; return the results."""
         return self.algorithm.env_runner_group.foreach_env_runner(
             lambda runner: do(envs_of(runner)), local_env_runner=False
         )
@@ -225,13 +225,13 @@ class RLlibPPO:
         )
 
     def last_error(self) -> str:
-        """Return the last error of a worker: its own, or RLlib's report of its end."""
+        """Return the last error that a worker raised, or else RLlib's report of its failure."""
         if reason := self._reason():
             return reason
         return f"a process that was killed, or ran out of memory ({self._log.message})"
 
     def _reason(self) -> str:
-        """Return the last error that a worker has raised itself; "" if there is none."""
+        """Return the message of the last error that a worker raised, or "" if there is none."""
         return ray.get(self._errors.last.remote())
 
     def close(self) -> None:
@@ -241,7 +241,7 @@ class RLlibPPO:
 
 
 def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
-    """Return the environments of a runner; RLlib adds their number."""
+    """Create the environments of a runner; RLlib adds their number to the context."""
     cluster.one_core()
     torch.set_num_threads(1)
     errors = context["errors"]
@@ -257,7 +257,7 @@ def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
 
 def envs_of(runner: EnvRunner) -> RunnerEnv:
     """Return a runner's environments without RLlib's wrappers."""
-    env: Any = runner.env  # type: ignore[attr-defined]  # of every runner of ours
+    env: Any = runner.env  # type: ignore[attr-defined]  # of every `EnvRunner` here
     while not isinstance(env, RunnerEnv):
         env = env.env
     return env
@@ -269,7 +269,7 @@ class GoOn(RLlibCallback):
     def on_env_runners_recreated(
         self, *, env_runner_group: Any, env_runner_indices: list[int], **kwargs: Any
     ) -> None:
-        """Update restarted runners before they step."""
+        """Update restarted runners before they step their environments."""
         living = set(env_runner_group.healthy_env_runner_ids()) - set(env_runner_indices)
         if not living:
             return
@@ -284,17 +284,17 @@ class GoOn(RLlibCallback):
 
 
 class WorkerErrors:
-    """The last error that a worker has raised; an actor of Ray."""
+    """An actor of Ray that stores the last error of the workers."""
 
     def __init__(self) -> None:
         self._last = ""
 
     def report(self, error: str) -> None:
-        """Keep an error in words."""
+        """Store the message of an error."""
         self._last = error
 
     def last(self) -> str:
-        """Return the last one; "" if there is none."""
+        """Return the last message, or "" if there is none."""
         return self._last
 
 
@@ -306,7 +306,7 @@ class LastError(logging.Handler):
         self.message = "no error was logged"
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep its last line."""
+        """Store the last line of a log record."""
         lines = [line.strip() for line in record.getMessage().splitlines() if line.strip()]
         if lines and lines[-1] != "NoneType: None":  # of `logger.exception` without one
             self.message = lines[-1].rstrip(".")[:400]

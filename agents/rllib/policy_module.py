@@ -1,4 +1,4 @@
-"""Network of Stable-Baselines3's PPO as a module of RLlib, whose policies are interchangeable."""
+"""The network of Stable-Baselines3's PPO as an RLlib module, with interchangeable policies."""
 
 from typing import Any
 
@@ -13,8 +13,8 @@ from stable_baselines3.common.policies import ActorCriticPolicy, MultiInputActor
 class PolicyModule(TorchRLModule, ValueFunctionAPI):
     """An `ActorCriticPolicy`, whose actions have a normal distribution.
 
-    `model_config["policy"]` holds its keywords: `net_arch`, `activation_fn`, `log_std_init`, and a
-    class of features.
+    `model_config["policy"]` holds its keyword arguments: `net_arch`, `activation_fn`,
+    `log_std_init`, and a class of feature extractors.
     """
 
     policy: ActorCriticPolicy

@@ -1,4 +1,4 @@
-"""Environments of one of RLlib's runners, in all phases of an episode, with scaled rewards."""
+"""Environments of an RLlib runner, in different phases of episodes, with scaled rewards."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -19,16 +19,16 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
 
 LARGEST_REWARD = 10.0
-"""Scaled rewards are clipped to this, as by Stable-Baselines3's `VecNormalize`."""
+"""Limit to which scaled rewards are clipped, as in Stable-Baselines3's `VecNormalize`."""
 
 
 def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any, Any]:
-    """Return environments that step together, on one thread.
+    """Create environments that step together, on one thread.
 
     Args:
         num_envs: number of environments.
-        keywords: as of `gymnasium.make`, with the task. At level `pixels`, which has no batched
-            form, the environments are stepped one after the other.
+        keywords: keyword arguments of `gymnasium.make`, and the task. At level `pixels`, which has
+            no batched form, the environments are stepped one after the other.
     """
     known = {name: value for name, value in keywords.items() if name != "num_threads"}
     if known.get("perception") != "pixels":
@@ -39,7 +39,7 @@ def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any,
 
 
 def try_environment(keywords: Mapping[str, Any]) -> None:
-    """Make an environment and step it once; an `HRCError` names a missing requirement."""
+    """Create an environment and step it once; raise `HRCError` if a requirement is missing."""
     with closing(make_envs(1, keywords)) as env:
         env.reset(seed=0)
         env.step(env.action_space.sample())
@@ -47,9 +47,9 @@ def try_environment(keywords: Mapping[str, Any]) -> None:
 
 @contextmanager
 def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
-    """Report the error of a block in words, and raise it again.
+    """Report the message of an exception in the context, and raise the exception again.
 
-    The error may be of a user's own task or estimator.
+    It may come from a user's custom task or estimator.
     """
     try:
         yield
@@ -60,16 +60,16 @@ def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
 
 
 class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
-    """Environments with scaled rewards and without infos, which keep finished episodes.
+    """Environments with scaled rewards and without infos, which summarize finished episodes.
 
     A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
-    Stable-Baselines3 does. First episodes end early at random times, so that a short rollout covers
-    all phases of an episode, if `env` is an `HRCVectorEnv`.
+    Stable-Baselines3 does. If `env` is an `HRCVectorEnv`, its first episodes end early at random
+    times, to cover all phases of an episode in a short rollout.
 
     Args:
         env: environments that restart in the step after an episode's end.
         gamma: discount per step.
-        report: receives the error of a reset or a step in words, before it is raised.
+        report: function that receives the message of an error in a reset or a step.
     """
 
     def __init__(
@@ -83,16 +83,16 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         self.scale = RunningMeanStd()
         """Running statistics of discounted returns."""
         self.proximity: float | None = None
-        """The weight that was set last; None: the configuration's."""
+        """Proximity weight that was set last, or None for that of the configuration."""
         self.finished: list[dict[str, float]] = []
-        """Statistics of episodes since `take_finished`."""
+        """Statistics of the episodes that ended since the last `take_finished`."""
         self._sums = EpisodeSums(self.num_envs)
         self._returns: Floats = np.zeros(self.num_envs)
         self._ended = np.zeros(self.num_envs, np.bool_)
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation of the environments; of several, the first."""
+        """Simulation of the environments, or the first of several ones."""
         if isinstance(self.env, HRCVectorEnv):
             return self.env.simulation
         return self.env.get_attr("simulation")[0]  # type: ignore[attr-defined]  # SyncVectorEnv
@@ -101,8 +101,8 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         """Start all episodes.
 
         Args:
-            seed: seed of the runner; environment k has seed * num_envs + k.
-            options: none.
+            seed: seed of the runner; that of environment k is seed * num_envs + k.
+            options: replaced by random phases of episodes, except at level `pixels`.
         """
         first_seed = None if seed is None else seed * self.num_envs
         if isinstance(self.env, HRCVectorEnv):
@@ -115,7 +115,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         return observation, {}
 
     def step(self, actions: NDArray[Any]) -> tuple[Any, Floats, Any, Any, dict[str, Any]]:
-        """Step all environments; those that had ended start anew instead."""
+        """Step all environments; those with ended episodes are reset instead."""
         with reported_errors(self._report):
             observation, reward, terminated, truncated, infos = self.env.step(actions)
         self._sums.add(reward, infos)
@@ -145,11 +145,11 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
             self.env.call("set_reward", weights)  # type: ignore[attr-defined]  # SyncVectorEnv
 
     def rewards_state(self) -> tuple[RunningMeanStd, float | None]:
-        """Return the scale of rewards, and the weight that was set."""
+        """Return the scale of rewards, and the proximity weight that was set last."""
         return self.scale, self.proximity
 
     def take_rewards_state(self, scale: RunningMeanStd, proximity: float | None = None) -> None:
-        """Continue with the scale of rewards, and the weight if it was set, of another runner."""
+        """Take over another runner's scale of rewards, and its proximity weight if it was set."""
         self.scale = scale
         if proximity is not None:
             self.weigh_proximity(proximity)

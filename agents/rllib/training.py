@@ -1,4 +1,4 @@
-"""Training by RLlib: as by Stable-Baselines3, with workers on the machines of a cluster."""
+"""Training by RLlib, the same as by Stable-Baselines3 but with workers on a cluster."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -33,17 +33,17 @@ def learn(
     """Continue the training of a policy up to its number of steps or an interrupt.
 
     Args:
-        run: task, budget and workers.
+        run: training arguments with task, budget and number of workers.
         settings: settings of PPO; a rollout has `n_steps` of every worker's environments.
         whole: weight of the proximity term after the ramp.
-        log: log of a PPO of Stable-Baselines3, which has the network, Adam's moments and the scale
-            of rewards, and is saved.
-        interrupt: checked before every update.
-        console: shows notes on the cluster.
+        log: log of a PPO of Stable-Baselines3, which holds the network, Adam's moments and the
+            scale of rewards, and is saved in checkpoints.
+        interrupt: handler of Ctrl-C, which is checked before every update.
+        console: console for messages about the cluster.
 
     Raises:
-        ConfigError: no such cluster, or a machine that cannot work.
-        HRCError: workers die repeatedly.
+        ConfigError: the cluster does not exist, or a machine cannot run the environment.
+        HRCError: workers fail repeatedly.
     """
     learner, folder = log.learner, log.folder / "tensorboard"
     learner.set_logger(configure_logger(0, str(folder), run.algorithm, run.resume is None))

@@ -1,4 +1,4 @@
-"""Metrics of a run for Ray's dashboard and Grafana: gauges and counters."""
+"""Metrics of a run for Ray's dashboard and Grafana."""
 
 from ray.util.metrics import Counter, Gauge
 
@@ -6,10 +6,10 @@ from .learner import Sampled
 
 
 class Watch:
-    """Metrics of a run in Ray, which machines export as `ray_hrc_env_...`.
+    """Gauges and counters of a run in Ray, which exports them as `ray_hrc_env_...`.
 
     Args:
-        task: the environment's id, which tags the metrics.
+        task: id of the task, with which the metrics are tagged.
     """
 
     def __init__(self, task: str) -> None:

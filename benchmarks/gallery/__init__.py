@@ -1,1 +1,1 @@
-"""The gallery: pictures of every body, every motion and every scene, and a page that shows them."""
+"""A gallery with pictures of every body, motion and scene, and a page that shows them."""

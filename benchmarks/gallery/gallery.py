@@ -1,4 +1,4 @@
-"""The pictures and the page of the gallery."""
+"""Creation of the pictures and the page of the gallery."""
 
 import html
 from collections.abc import Sequence
@@ -37,12 +37,12 @@ class Exhibit(NamedTuple):
     title: str
     caption: str
     is_wide: bool
-    """Whether it has its own row."""
+    """Whether the picture has a row of its own."""
 
 
 @dataclass(frozen=True, slots=True)
 class GalleryConfig:
-    """The contents of the gallery."""
+    """Names of the bodies, motions and scenes in the gallery."""
 
     bodies: tuple[str, ...] = worker_names()
     motions: tuple[str, ...] = tuple(SCENES)
@@ -55,7 +55,7 @@ class GalleryConfig:
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
-    """Draw all pictures into a folder with an `index.html`; return the exhibits of the page."""
+    """Render all pictures into a folder, and write its `index.html`; return the exhibits."""
     out.mkdir(parents=True, exist_ok=True)
     share = 1.0 / max(len(config.bodies) + len(config.motions) + VIEWS * len(config.scenes), 1)
     shown: list[Exhibit] = []
@@ -84,7 +84,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
 
 
 def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
-    """Write `index.html` into a folder of pictures; exhibits of a section are shown together."""
+    """Write `index.html` to a folder of pictures, with the exhibits grouped by section."""
     sections = groupby(exhibits, lambda exhibit: exhibit.section)
     body = "".join(
         f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'

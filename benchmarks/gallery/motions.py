@@ -1,4 +1,4 @@
-"""Film strips: a scene of the repertoire in a few frames, with a camera that follows the worker."""
+"""Film strips of scenes of the repertoire, with a camera that follows the worker."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import SEGMENT, load_body
 
 FRAMES, FRAME_PX = 6, (300, 420)
-"""Number of frames of a strip, width and height of each [px]."""
+"""Number of frames in a strip, and width and height of each [px]."""
 DT_S = 0.05
 HFOV_DEG, TARGET_M = 38.0, 0.92
-"""Field of view of the camera [deg], and the height that it looks at [m]."""
+"""Horizontal field of view of the camera [deg], and height of the point it looks at [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """The place of a scene on the site, and the position of its camera."""
+    """The location of a scene on the site, and the position of its camera."""
 
     xy_m: tuple[float, float]
     """Position of the worker at the start [m]."""
     yaw_rad: float
-    """Heading of the worker [rad]."""
+    """Heading of the worker at the start [rad]."""
     aside_rad: float
     """Direction of the camera, relative to the worker's heading [rad]."""
     away_m: float
@@ -51,11 +51,11 @@ STAGED: dict[str, tuple[str, float, float]] = {
     "drill overhead": ("lintel", -2.0, 3.0),
     "climb": ("hop_up", -1.3, 2.8),
 }
-"""Scenes at a workplace of the site: its name, direction and distance of the camera."""
+"""Scenes at a workplace of the site: its name, and direction and distance of the camera."""
 
 
 def draw_strip(name: str, body_name: str, seed: int = 0) -> Image:
-    """Return a scene of the repertoire as a film strip, an image (420, about 1800, 3)."""
+    """Render a scene of the repertoire as a film strip, an image (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
     stage = make_stage(name)
     me = make_worker(load_body(body_name), stage.xy_m, stage.yaw_rad)
@@ -87,7 +87,7 @@ def make_stage(name: str) -> Stage:
 
 
 def spread_frames(lengths: Sequence[int]) -> list[tuple[int, int]]:
-    """Return evenly spread frames of films of given lengths, as pairs of film and row."""
+    """Return frames at equal intervals in films of given lengths, as pairs of film and row."""
     rows = [(film, row) for film, length in enumerate(lengths) for row in range(length)]
     shares = (np.arange(FRAMES) + 0.5) / FRAMES
     return [rows[int(share * len(rows))] for share in shares]

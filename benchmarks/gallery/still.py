@@ -28,9 +28,9 @@ CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
         ("slab_floor_1", "kneel", 0.5), ("carts", "wheelbarrow", 0.35),
     ),
 }  # fmt: skip
-"""People in the pictures of a scene: workplace, scene of the repertoire, share of it."""
+"""Workers in the pictures of a scene: workplace, scene of the repertoire, and share of its time."""
 OVERVIEW = {"lab": "room", "site": "overview"}
-"""Name of the view that shows most of a scene."""
+"""Name of the view that shows most of a scene, by scene."""
 
 
 def make_camera(
@@ -38,7 +38,7 @@ def make_camera(
 ) -> PinholeCamera:
     """Return a camera that looks at a point (3,) [m] from a direction and a horizontal distance.
 
-    The direction is measured from world +x; the camera's field of view, width and height are given.
+    The direction `turn_rad` is measured from world +x.
     """
     x, y, _ = target_world
     eye = np.array([x + away_m * np.cos(turn_rad), y + away_m * np.sin(turn_rad), EYE_M])
@@ -46,7 +46,7 @@ def make_camera(
 
 
 def portrait(body_name: str, seed: int = 1) -> Image:
-    """Return a picture of a worker on the laboratory's floor, from the front and slightly aside."""
+    """Render a worker in the laboratory, from the front and slightly from the side."""
     scene = build(n_workers=1, bodies=body_name)
     x, y, yaw = SITTING
     me = make_worker(load_body(body_name), (x, y), yaw)
@@ -59,7 +59,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
 
 
 def views(scene_name: str, body_name: str) -> dict[str, Image]:
-    """Return pictures of a scene with people at work: an overview, then each camera's view."""
+    """Render a scene with people at work: an overview, then the view of each camera."""
     cast = CASTS[scene_name]
     scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
     motion = _stack_workers([_move_at_work(scene, body_name, *role) for role in cast])
@@ -75,7 +75,7 @@ def views(scene_name: str, body_name: str) -> dict[str, Image]:
 def _move_at_work(
     scene: Scene, body_name: str, place_name: str, doing: str, share: float
 ) -> WorkerMotion:
-    """Return the motion of one worker (1, ...) at a share of an activity at a place."""
+    """Return the motion of one worker (1, ...) at a share of the time of an activity."""
     place: Workplace = next(p for p in scene.grounds.places if p.name == place_name)
     me = make_worker(load_body(body_name), place.xy_m, place.yaw_rad)
     films = perform(REPERTOIRE[doing], me, np.random.default_rng(2), 0.05)
@@ -84,7 +84,7 @@ def _move_at_work(
 
 
 def _stack_workers(workers: list[WorkerMotion]) -> WorkerMotion:
-    """Return several workers, each with arrays (1, ...), as one record (W, ...)."""
+    """Combine several workers, each with arrays (1, ...), into one record (W, ...)."""
 
     def joined(records: Sequence[Any], *names: str) -> list[Any]:
         return [np.concatenate([getattr(each, name) for each in records]) for name in names]

@@ -1,1 +1,1 @@
-"""Similarity of the workers' activities to those of people, by statistics."""
+"""Comparison of the workers' motion with measurements of people, by statistics."""

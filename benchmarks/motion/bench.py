@@ -1,4 +1,4 @@
-"""The motion benchmark: every scene of the repertoire, played by several workers, and measured."""
+"""The motion benchmark: statistics of every scene of the repertoire, played by several workers."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -19,12 +19,12 @@ from hrc_env.motion.repertoire import SCENES, Film, make_worker, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
-"""Time between frames of a film, short enough for accelerations [s]."""
+"""Time between frames of a film [s], short enough for the computation of accelerations."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionBench:
-    """The experiment, and the amount of data that is played."""
+    """The experiment, and its amount of data."""
 
     name = "bench motion"
     depends = ("motion",)
@@ -35,7 +35,7 @@ class MotionBench:
     """Names of the bodies."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid."""
         check_at_least_one(self, "n_seeds")
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
@@ -46,7 +46,7 @@ class MotionBench:
         return list(range(self.n_seeds))
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
@@ -70,13 +70,13 @@ class MotionBench:
 
 
 QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))
-"""The quick form: every number, from little data."""
+"""The quick form, which computes every number from less data."""
 
 
 def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
-    """Return a scene's statistics over its films.
+    """Compute the statistics of a scene from its films.
 
-    Each is the median over bodies, with the least and the greatest.
+    Each metric is the median over bodies, with the minimum and the maximum.
     """
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
@@ -96,13 +96,13 @@ def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
 
 
 def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
-    """Return the films of a scene."""
+    """Play a scene and return its films."""
     me = make_worker(body, right=seed % 2 == 0)
     return perform(SCENES[scene], me, np.random.default_rng([17, seed]), DT_S)
 
 
 def _unit(key: str) -> str:
-    """Return the unit of a statistic, from its name."""
+    """Derive the unit of a statistic from its name."""
     for ending, unit in (
         ("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_m", "m"), ("_deg", "deg"), ("seconds", "s"),
         ("_per_min", "1/min"),

@@ -1,6 +1,6 @@
-"""Statistics of films: speeds, accelerations and errors of workers' motions.
+"""Statistics of films: speeds, accelerations and errors of the workers' motion.
 
-The errors are slipping feet, missed targets of hands, and self-contact.
+The errors are slipping feet, hands that miss their targets, and self-intersection.
 """
 
 from collections.abc import Sequence
@@ -20,23 +20,23 @@ WRISTS = [SEGMENT[f"{side}_hand"] for side in SIDES]
 ANKLES = [SEGMENT[f"{side}_foot"] for side in SIDES]
 HEAD = [SEGMENT["head"]]
 MISSED_M = 0.01
-"""Distance from its target beyond which a hand has missed it [m]."""
+"""Distance of a hand from its target above which it has missed the target [m]."""
 LOADED_M = 0.001
-"""Height of the ball of a foot above its ground below which the foot bears weight [m]."""
+"""Height of the ball of a foot above the ground below which the foot bears weight [m]."""
 STEADY_SHARE = 0.97
-"""Share of the top speed from which a walk is steady."""
+"""Share of the top speed above which a walk is steady."""
 DEEP_M = 0.05
-"""Depth from which capsules count as intersecting [m]: they are rounder than limbs, and flesh
-yields."""
+"""Depth above which capsules count as intersecting [m]; capsules are rounder than limbs, and flesh
+is soft."""
 
 
 def compute_statistics(films: Sequence[Film], body: Body) -> dict[str, float]:
-    """Return the statistics of all frames of the films of one scene."""
+    """Compute the statistics over all frames of a scene's films."""
     numbers: dict[str, float] = {}
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
         speeds = np.concatenate([_speeds(film, which) for film in films])
         alike = name == "ankle" or films[0].activity == st.WALK
-        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the busier hand counts
+        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the faster hand counts
         numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))
         numbers[f"{name}_max_m_s"] = float(speeds.max())
         rates = np.concatenate([_accelerations(film, which) for film in films])
@@ -63,14 +63,14 @@ def _speeds(film: Film, which: list[int]) -> Floats:
 
 
 def _accelerations(film: Film, which: list[int]) -> Floats:
-    """Return the accelerations of the origins of segments, of all frames [m/s^2]."""
+    """Return the accelerations of the origins of segments in all frames [m/s^2]."""
     velocity = film.motion.velocity_world[:, 0, which]
     change = np.diff(velocity, axis=0) / np.diff(film.time_s)[:, None, None]
     return np.linalg.norm(change, axis=-1).ravel()
 
 
 def compute_slips(film: Film) -> Floats:
-    """Return the speeds over the floor of the balls of feet that bear weight [m/s]."""
+    """Return the speeds of the balls of those feet that bear weight [m/s]."""
     grounds = np.unique(np.round([0.0, *film.worker.footprints[:, 4]], 4))
     found = []
     for side in SIDES:
@@ -84,7 +84,7 @@ def compute_slips(film: Film) -> Floats:
 
 
 def compute_grips(film: Film) -> Floats:
-    """Return positions (T, 2, 3) of the hands' grips, beyond the wrist along the forearm [m]."""
+    """Return positions (T, 2, 3) of the grips, beyond the wrists along the forearms [m]."""
     place = film.motion.position_world[:, 0]
     both = []
     for side in SIDES:
@@ -95,7 +95,7 @@ def compute_grips(film: Film) -> Floats:
 
 
 def find_arrivals(film: Film) -> Bools:
-    """Return when each hand should be at its target (T, 2)."""
+    """Return a mask (T, 2) of frames in which each hand should be at its target."""
     return film.controls[:, c.HAND_SHARE : c.HAND_SHARE + 2] > 1.0 - 1e-9
 
 
@@ -109,9 +109,9 @@ def compute_misses(film: Film) -> Floats:
 
 
 def compute_depths(film: Film, body: Body) -> Floats:
-    """Return the greatest depth (T,) to which limbs intersect other parts [m].
+    """Return the maximum depth (T,) to which limbs intersect other parts of the body [m].
 
-    It is negative where they do not: the clearance.
+    If there is no intersection, it is the negative clearance.
     """
     truth = worker_truth(body, film.motion)
     capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m[0, 0]
@@ -140,7 +140,7 @@ def _pairs(body: Body) -> list[tuple[int, int]]:
 
 
 def compute_gait(film: Film) -> dict[str, float]:
-    """Return cadence, step length and width, bob and knee flexion of a straight walk."""
+    """Compute cadence, step length and width, bob and knee flexion of a straight walk."""
     place, rate = film.motion.position_world[:, 0], film.motion.velocity_world[:, 0]
     ahead = place[-1, 0, :2] - place[0, 0, :2]
     ahead /= np.linalg.norm(ahead)
@@ -165,7 +165,7 @@ def compute_gait(film: Film) -> dict[str, float]:
 
 
 def _smooth(speed: Floats) -> Floats:
-    """Return the mean speed over about half a second of a film at 100 Hz."""
+    """Return the moving average of speeds over about half a second of a film at 100 Hz."""
     window = np.ones(51) / 51
     return np.convolve(np.pad(speed, 25, "edge"), window, "valid")
 

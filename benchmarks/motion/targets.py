@@ -1,4 +1,4 @@
-"""Bands of statistics of people's motion, with their sources, for activities."""
+"""Target bands for statistics of activities, from measurements of people, with their sources."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ ANY = "*"
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A band for a statistic of a scene."""
+    """A band in which a statistic of a scene should be, and its source."""
 
     scene: str
     statistic: str
@@ -24,7 +24,7 @@ class Target:
 
 
 def _walk(speed: float) -> list[Target]:
-    """Return the bands of a walk at a speed [m/s]: within 10 % of the fits."""
+    """Return the bands of a walk at a speed [m/s], most within 10 % of fits to the trials."""
     name = format_walk(speed)
     cadence, length = 96.2 * speed**0.468, 0.345 + 0.286 * speed
     return [
@@ -37,7 +37,7 @@ def _walk(speed: float) -> list[Target]:
 
 
 def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
-    """Return the bands of wrists and ankles in a walk: 10 % around their 95th percentiles [m/s]."""
+    """Return the bands of wrists and ankles in a walk, within 10 % of 95th percentiles [m/s]."""
     name = format_walk(speed)
     return [
         Target(name, "wrist_p95_m_s", 0.9 * wrist, 1.1 * wrist, CMU),
@@ -46,7 +46,7 @@ def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
 
 
 def format_walk(speed_m_s: float) -> str:
-    """Return the name of the scene of a walk."""
+    """Return the name of the scene of a walk at a speed."""
     return f"walk {speed_m_s:.1f} m/s"
 
 

@@ -1,1 +1,1 @@
-"""Speed and accuracy of perception from pixels, and the effects of faults."""
+"""Speed and accuracy of perception from pixels, and the effects of camera faults."""

@@ -1,7 +1,7 @@
-"""The perception benchmark: speed of detection, accuracy, and effects of faults.
+"""The perception benchmark: speed of detection, accuracy, and the effects of faults.
 
-Each part is written to DIR/parts as soon as it is complete, so a run that was stopped continues
-there; parts of other versions or settings are computed again. Times are measured last.
+Each part is written to DIR/parts as soon as it is complete, and a run that was stopped continues
+there. Parts of other versions or settings are computed again. Times are measured last.
 """
 
 import zlib
@@ -35,11 +35,11 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
-"""Rigs with cameras in the same places, by the rows of their crops."""
+"""Rigs with cameras at the same positions, by the rows of their crops."""
 FIRST_SEED = 500
-"""First seed of episodes, and of crops."""
+"""Seed of the first episode, and of the crops."""
 BLOCK = 5
-"""Number of episodes in a part, which bounds the loss when a run is stopped."""
+"""Number of episodes in a part, which limits the loss when a run is stopped."""
 
 Parts = dict[str, dict[str, Any]]
 """Finished parts by label."""
@@ -47,42 +47,42 @@ Parts = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class PerceptionBench:
-    """The experiment, and the amount of data that is measured."""
+    """The experiment, and its amount of data."""
 
     name = "bench perception"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
-    """Number of episodes at `pixels` by scene; faults are compared with the first ones of the
-    lab."""
+    """Number of episodes at `pixels` by scene; the first ones in the lab are the baseline of
+    faults."""
     n_steps: int = 250
-    """Steps of these episodes."""
+    """Number of steps of these episodes."""
     n_faults: int = 4
-    """Number of episodes of every fault at `pixels`; the four cameras have it in turns."""
+    """Number of episodes of every fault at `pixels`, in which the faulty camera alternates."""
     fault_steps: int = 150
-    """Steps of these episodes."""
+    """Number of steps of these episodes."""
     n_emulated: int = 20
-    """Number of episodes of every fault at `keypoints`, of `n_steps` each."""
+    """Number of episodes of every fault at `keypoints`, each of `n_steps` steps."""
     kinds: tuple[str, ...] = tuple(KINDS)
     """Names of the faults."""
     bodies: tuple[str, ...] = worker_names()
-    """Names of the bodies on crops."""
+    """Names of the bodies in the crops."""
     n_instants: int = 15
-    """Number of moments of each body in each scene, and of each lens; four crops each."""
+    """Number of moments, with four crops each, of each body in each scene, and of each lens."""
     emulator_rounds: int | None = 2
     """Number of times that each motion is rendered in each scene to compare the emulator with
     pixels.
 
-    0: once, in one scene; None: not at all.
+    With 0, each is rendered once in one scene; with None, the emulator is left out.
     """
     cameras: tuple[int, ...] = (1, 2, 4)
-    """Numbers of cameras at which speed is measured."""
+    """Numbers of cameras with which speed is measured."""
     workers: tuple[int, ...] = (1, 2)
-    """Numbers of workers at which speed is measured."""
+    """Numbers of workers with which speed is measured."""
     speed_steps: int = 200
     """Number of steps in a measurement of speed."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid."""
         counts = ("n_steps", "n_faults", "fault_steps", "n_emulated", "n_instants", "speed_steps")
         check_at_least_one(self, *counts)
         if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
@@ -105,16 +105,16 @@ class PerceptionBench:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """Warning on the tables and figures of a short run, or "" if it is long enough."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Parts:
-        """Return all parts by their labels."""
+        """Return all parts by label, each computed or from the cache."""
         tasks = list(make_tasks(self, cache.folder.parent / "figures"))
         cache = replace(cache, n_parts=sum(task.cost for task in tasks))
         away = [task for task in tasks if not task.is_here]
@@ -144,7 +144,7 @@ QUICK = PerceptionBench(
     n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
 )  # fmt: skip
-"""The quick form: every number, from little data."""
+"""The quick form, which computes every number from less data."""
 
 
 class Task(NamedTuple):
@@ -152,10 +152,10 @@ class Task(NamedTuple):
 
     label: str
     cost: float
-    """Approximate time that it takes relative to others [s]."""
+    """Approximate computing time, relative to other parts [s]."""
     make: Callable[[PartProgress], dict[str, Any]]
     is_here: bool = False
-    """Whether it runs in this process, alone: it measures time, or draws."""
+    """Whether the part runs alone in this process, because it measures time or draws."""
 
     @property
     def part(self) -> Part:
@@ -164,7 +164,7 @@ class Task(NamedTuple):
 
 
 def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
-    """Yield all parts, time measurements last; the plot of the emulator is drawn into a folder."""
+    """Yield all parts, time measurements last; the part of the emulator saves a figure."""
     yield from _crops(config)
     yield from _episodes(config)
     yield from _faults(config)
@@ -175,9 +175,9 @@ def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator
 
 
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
-    """Yield speeds of the lab in all sizes, and of its largest rig in other conditions.
+    """Yield measurements of speed in the lab with all numbers of cameras and workers.
 
-    The conditions are the site and the other runtime.
+    The largest rig is also measured on the site and with the other runtime.
     """
     most, fewest = max(config.cameras), min(config.workers)
     runtimes = (speed.LITERT, speed.OPENVINO) if vino.is_installed() else (speed.LITERT,)
@@ -205,7 +205,7 @@ def _episodes(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _faults(config: PerceptionBench) -> Iterator[Task]:
-    """Yield every fault at the levels that have it, and for `keypoints` the same without faults."""
+    """Yield every fault at the levels that simulate it, and a baseline for `keypoints`."""
     for kind in config.kinds:
         make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
         slow = 3.0 if kind == "motion_blur" else 1.2
@@ -224,7 +224,7 @@ def _play(seeds: list[int], n_steps: int, tick: PartProgress, **arguments: Any) 
 
 
 def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress) -> dict[str, Any]:
-    """Return episodes in which the cameras have a fault in turns."""
+    """Play episodes with a fault, in which the faulty camera alternates."""
     played: list[dict[str, Any]] = [{}] * n
     n_cameras = len(SCENES["lab"].cameras)
     for c in range(min(n_cameras, n)):
@@ -239,7 +239,7 @@ def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress)
 
 
 def _crops(config: PerceptionBench) -> Iterator[Task]:
-    """Yield crops of every body in every scene, and of one body with every lens and appearance."""
+    """Yield crops of every body in every scene, and of one body by every lens and appearance."""
     n, first = config.n_instants, config.bodies[0]
     cost = 3 + 0.12 * n
     for name, _ in config.episodes:
@@ -255,7 +255,7 @@ def _crops(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -> dict[str, Any]:
-    """Return n moments, in which every activity has its turn."""
+    """Return the crops of n moments, over which the activities alternate."""
     scene, views = make(), list[View]()
     rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)

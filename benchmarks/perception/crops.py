@@ -1,8 +1,8 @@
-"""Crops of workers at their work, detected without a former track.
+"""Crops of workers at work, which are detected without a previous track.
 
-A worker moves by the motion generator and is rendered with the arm near its home pose. Each camera
-gives a crop around the true joints, cut as in the pipeline. Only crops count with every joint in
-the image and neither room nor robot in front of one ("in view").
+The motion generator moves a worker, which is rendered with the arm near its home pose. Each camera
+provides a crop around the true joints, cut as in the pipeline. Crops are evaluated only if every
+joint is in the image, and neither room nor robot hides one ("in view").
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,13 +35,13 @@ from hrc_env.worker.body import load_body, worker_truth
 
 STEP_S = 0.04
 PAUSE_STEPS = (20, 80)
-"""Steps between two moments, 0.8 to 3.2 s, so that they show different work."""
+"""Range of the number of steps between two moments (0.8 to 3.2 s), to vary the activity."""
 PATIENCE = 200
-"""Number of moments without a wanted activity after which the search for it is given up."""
+"""Number of moments without the desired activity after which another one is accepted."""
 
 
 class Instant(NamedTuple):
-    """A moment of a worker's work."""
+    """A moment of a worker at work."""
 
     activity: str
     q: JointAngles
@@ -52,18 +52,18 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """Detections of the cameras at one moment; arrays (C,)."""
+    """Detections of C cameras at one moment, as arrays (C,)."""
 
     in_view: Bools
-    """Whether all joints are in the image, with neither room nor robot in front of them."""
+    """Whether all joints are in the image, and neither room nor robot hides one."""
     error: Floats
-    """Mean distance of the joints from the truth as a share of the stature; NaN: missed."""
+    """Mean error of the joints in the image as a share of the stature; NaN if not detected."""
     distance_m: Floats
-    """Distance from the camera to the middle of the body [m]."""
+    """Distance from the camera to the centre of the body [m]."""
     angle_deg: Floats
-    """Angle between the body's heading and the direction to the camera, from above [deg].
+    """Horizontal angle between the body's heading and the direction to the camera [deg].
 
-    It is 0 from the front and 180 from behind.
+    It is 0 for a camera in front of the body and 180 for one behind it.
     """
 
 
@@ -77,11 +77,11 @@ class Looker:
         self.detector = PoseDetector(scene.cameras)
 
     def randomize(self, look: Look) -> None:
-        """Set the appearance of the scene from the next moment on."""
+        """Set the appearance of the scene for the following moments."""
         self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
-        """Detect the worker at a moment with every camera."""
+        """Detect the worker in every camera at a moment."""
         scene = self.scene
         joints = worker_truth(self.body, now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
@@ -102,19 +102,19 @@ class Looker:
         )
 
     def close(self) -> None:
-        """Free threads and the graphics context."""
+        """Release the threads and the graphics context."""
         self.detector.close()
         self.renderer.close()
 
     def _found(self, now: Instant, true_px: Points2, depth_m: Floats) -> Points2:
-        """Return the detections (C, J, 2) in pinhole pixels; NaN for a worker that is not found."""
+        """Return the detections (C, J, 2) in pinhole pixels; NaN if the worker is not found."""
         cameras = self.scene.cameras
         views = zip(true_px, depth_m, cameras, strict=True)
         windows = [window_from_joints(*view) for view in views]
         if not any(windows):
             return np.full_like(true_px, np.nan)
         self.renderer.pose(now.q, one(now.motion, 0))
-        self.detector.forget(0)  # as at a first look: the detector stage must agree
+        self.detector.forget(0)  # as without a track: the detector stage must agree
         px = self.detector.detect(self.source, windows).px
         return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])
 
@@ -122,10 +122,10 @@ class Looker:
 def instants(
     scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str]
 ) -> Iterator[Instant]:
-    """Yield n moments of a worker's work in a scene.
+    """Yield n moments of a worker at work in a scene.
 
-    Wanted activities are shown in turns if one occurs within some minutes, else activities as they
-    occur. The worker has the scene's first body.
+    The desired activities alternate; one that does not occur within some minutes is replaced by the
+    current one. The worker has the first body of the scene.
     """
     body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
@@ -144,7 +144,7 @@ def instants(
 
 
 def view_angle_deg(joints_world: Points3, eyes_world: Points3) -> Floats:
-    """Return view angles (C,) as in `Looked.angle_deg`, for joints (J, 3) and cameras (C, 3)."""
+    """Return the view angles (C,) of `Looked.angle_deg`, for joints (J, 3) and cameras (C, 3)."""
     left = joints_world[[JOINT["left_shoulder"], JOINT["left_hip"]]].mean(0)
     right = joints_world[[JOINT["right_shoulder"], JOINT["right_hip"]]].mean(0)
     across = (left - right)[:2]

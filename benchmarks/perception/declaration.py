@@ -1,4 +1,4 @@
-"""The declaration of the perception benchmark: rows, columns and tables."""
+"""Rows, columns and tables of the perception benchmark."""
 
 from dataclasses import replace
 
@@ -15,16 +15,16 @@ FAULTS = {
 POSTURES = {each: (each,) for each in ("stand", "walk", "carry", "work", "fold", "all")}
 SHOWN = ("none", "wrong_rotation", "wrong_translation", "wrong_focal", "knocked", "noise",
          "exposure")  # fmt: skip
-"""Faults for which the documentation shows the reports of miscalibrated cameras."""
+"""Faults for which the documentation shows how often cameras are reported as miscalibrated."""
 
 
 def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Column]:
-    """Return columns of the error of estimates and of their reported deviations.
+    """Return columns of the error of estimates and of their reported standard deviations.
 
     Args:
         start: prefix of the metrics.
         words: prefix of the headings.
-        key: key of the row in the names of metrics.
+        key: pattern of the row in the names of metrics.
     """
     return {
         "median": Column(f"{start}error_m.{key}.median", f"{words}median [mm]", 1, 1000),
@@ -36,7 +36,7 @@ def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Colum
 
 
 def make_fault_columns(level: str) -> dict[str, Column]:
-    """Return the columns of a level's faults."""
+    """Return the columns on faults at a perception level."""
     start, words = LEVELS[level], f"`{level}`: "
     return {
         "ratio": Column(f"{start}error_ratio.{{}}", f"{words}ratio", 2),
@@ -46,7 +46,7 @@ def make_fault_columns(level: str) -> dict[str, Column]:
 
 
 def make_name_columns(level: str) -> tuple[Column, ...]:
-    """Return the columns of a level's reports of miscalibrated cameras."""
+    """Return the columns on reports of miscalibrated cameras at a perception level."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
         Column(f"{key}named", f"{words}reported", shows="count"),

@@ -1,10 +1,10 @@
-"""Accuracy of the pose network on dark and dull pictures.
+"""Accuracy of the pose network on dark images and images of low contrast.
 
     python -m benchmarks.perception.dim
 
-The same moments are rendered in normal light and with each of `PICTURES`, and every camera detects
-the worker without a former track. The deviations of `hrc_env.perception.exposure` were fitted to
-this table.
+The same moments are rendered in normal light and with each of `PICTURES`, and the worker is
+detected in every camera without a previous track. The standard deviations in
+`hrc_env.perception.exposure` were fitted to this table.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,18 +32,18 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
 GROSS = 8.0
-"""Greatest error that counts, in deviations, so that single gross errors do not dominate."""
+"""Limit to which errors in standard deviations are clipped, to reduce single gross errors."""
 
 
 class Picture(NamedTuple):
-    """A kind of degraded picture."""
+    """A degradation of images."""
 
     light: float = 1.0
     """Light, as in `AppearanceConfig`."""
     darkness: float = 1.0
-    """Amount of the fault."""
+    """Amount of the fault `darkness`."""
     contrast: float = 1.0
-    """Factor on the difference from middle grey."""
+    """Factor on the difference of pixels from middle grey."""
 
 
 PICTURES: dict[str, Picture] = {
@@ -66,14 +66,14 @@ class Arguments:
 
 
 class _Seen(NamedTuple):
-    """One crop."""
+    """The detection in one crop."""
 
-    error_px: Floats  # (J,) of each joint; NaN: missed
-    sigma_px: Floats  # (J,) as told
+    error_px: Floats  # (J,) of each joint; NaN if not detected
+    sigma_px: Floats  # (J,) as reported
 
 
 class _Spoilt:
-    """An image source with degraded pictures."""
+    """An image source with degraded images."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
@@ -81,7 +81,7 @@ class _Spoilt:
         self.picture, self.count = Picture(), 0
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return the window of a camera's image."""
+        """Return a window of a camera's degraded image."""
         image, kind = self.source.crop(camera_index, window), self.picture
         self.count += 1
         if kind.contrast < 1.0:
@@ -92,7 +92,7 @@ class _Spoilt:
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
-        """Show a moment from now on, with a picture's light and faults."""
+        """Set the moment of the following crops, and their degradation."""
         light = AppearanceConfig(light=(picture.light, picture.light))
         self.picture = picture
         self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
@@ -100,7 +100,7 @@ class _Spoilt:
 
 
 def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
-    """Return the crops by the names of `PICTURES`, the same moments and cameras in each list."""
+    """Return crops of the same moments and cameras, by the names of `PICTURES`."""
     scene = build(SceneConfig(), name, 1, body)
     spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
     seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
@@ -129,20 +129,20 @@ def _compare(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
 
 
 class Row(NamedTuple):
-    """Comparison of a degraded picture with normal light."""
+    """Comparison of degraded images with those in normal light."""
 
     n_known: int
     """Number of crops with a detection in normal light."""
     n_both: int
-    """Number of these crops with a detection in this picture too."""
+    """Number of these crops that also have a detection if degraded."""
     error: float
-    """Median error in the latter crops, as a factor on that in normal light."""
+    """Ratio of the median error in the latter crops to that in normal light."""
     spread: float
-    """Root mean square of error over deviation, as a factor on that in normal light."""
+    """Ratio of the root mean square of error / standard deviation to that in normal light."""
 
 
 def make_row(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> Row:
-    """Compare a degraded picture with normal light."""
+    """Compare degraded images with those in normal light."""
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 
@@ -157,7 +157,7 @@ def make_row(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> Row:
 
 
 def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
-    """Measure, and print a table for each scene."""
+    """Measure all degradations, and print a table for each scene."""
     for name in asked.scenes:
         parts = [look(name, body, asked) for body in asked.bodies]
         seen = {kind: [view for part in parts for view in part[kind]] for kind in PICTURES}

@@ -1,7 +1,7 @@
-"""Episodes of the environment: estimated and true joints, step by step.
+"""Episodes of the environment, with errors of the estimated joints in every step.
 
-The arm rests, so the worker of a seed moves identically with all cameras: faults and levels are
-compared on the same motion.
+The arm rests, which makes the motion of the worker depend on the seed only: faults and perception
+levels are compared on the same motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,24 +22,24 @@ from hrc_env.worker.body import worker_truth
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """One episode of T steps with one worker, without the reset."""
+    """An episode of T steps with one worker, excluding the reset."""
 
     error_m: Floats
     """Errors of the estimate (T, J) [m]; NaN if the worker was not tracked."""
     std_m: Floats
-    """Root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
+    """Square root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
     tracked."""
     inside95: Ints
     """Number of joints within the reported 95 % region (T,)."""
     off_px: Floats
-    """Mean distance of a camera's keypoints from the true joints (T, C) [px]; NaN: no detection."""
+    """Mean error of a camera's keypoints (T, C) [px]; NaN without a detection."""
     family: Ints
-    """Activity of the worker (T,), an index in `views.FAMILIES`."""
+    """Family of the worker's activity (T,), as an index in `views.FAMILIES`."""
     named: Bools
-    """Whether a camera was reported as miscalibrated (T, C)."""
+    """Mask (T, C) of cameras that were reported as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return lists of numbers for JSON, lengths to a tenth of a millimetre.
+        """Return lists of numbers for JSON, rounded to four decimals.
 
         Missing values are NaN.
         """
@@ -54,7 +54,7 @@ def read_episode(content: dict[str, Any]) -> Episode:
 
 
 def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
-    """Return some steps of an episode."""
+    """Return an episode reduced to some of its steps."""
     names = [each.name for each in fields(Episode)]
     return Episode(*(getattr(episode, name)[steps] for name in names))
 
@@ -62,7 +62,7 @@ def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """Return one episode per seed of an environment with the given arguments.
+    """Play one episode per seed in an environment with the given arguments.
 
     The arm rests.
     """
@@ -101,7 +101,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
 
 
 def _measure_error_px(env: HRCEnv, joints_world: Floats) -> Floats:
-    """Return the distance of this step's keypoints from the truth (C,) [px]; NaN: no detection."""
+    """Return the mean error (C,) of this step's keypoints [px]; NaN without a detection."""
     keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras
     if keypoints is None:

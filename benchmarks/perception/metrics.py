@@ -1,4 +1,4 @@
-"""Metrics of the parts of the perception benchmark."""
+"""Computation of the perception benchmark's metrics from its parts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +24,7 @@ PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
 N_DRAWS = 200
 Metrics = dict[str, Metric]
 Found = Mapping[str, dict[str, Any]]
-"""Finished parts by label, as of `bench.tasks_of`."""
+"""Finished parts by label, as in `bench.Parts`."""
 
 
 def compute_metrics(found: Found, n_faults: int, fault_steps: int) -> Metrics:
@@ -32,8 +32,8 @@ def compute_metrics(found: Found, n_faults: int, fault_steps: int) -> Metrics:
 
     Args:
         found: finished parts.
-        n_faults: number of the lab's first episodes with which faults are compared.
-        fault_steps: number of steps to which these are cut.
+        n_faults: number of first episodes in the lab with which faults are compared.
+        fault_steps: number of steps to which these episodes are cut.
     """
     played = {
         label: [read_episode(each) for each in part["episodes"]]
@@ -84,7 +84,7 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
 
 
 def _belief(name: str, episodes: list[Episode]) -> Metrics:
-    """Return error, coverage, reported deviation and lost steps of episodes."""
+    """Compute error, coverage, reported standard deviation and lost steps of episodes."""
     errors = [_select_tracked(episode.error_m) for episode in episodes]
     squared = [float((each**2).sum()) for each in errors]
     reported = [float((_select_tracked(episode.std_m) ** 2).sum()) for episode in episodes]
@@ -103,9 +103,9 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
 
 
 def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
-    """Return metrics of faults relative to the same seeds without faults.
+    """Compute metrics of faults relative to the same seeds without faults.
 
-    Cameras have the fault in turns.
+    The faulty camera alternates between episodes.
     """
     metrics: Metrics = {}
     for (level, kind), episodes in faults.items():
@@ -124,7 +124,7 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
 
 
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
-    """Return the median error relative to that of the same seeds without the fault.
+    """Compute the median error relative to that of the same seeds without the fault.
 
     The interval is a bootstrap over seeds.
     """
@@ -143,14 +143,14 @@ def _median(values: list[Floats], which: Ints) -> float:
 
 
 def _rate_detections(episodes: list[Episode], cameras: list[int]) -> Metric:
-    """Return the share of steps in which the camera with the fault detected the worker."""
+    """Compute the share of steps in which the faulty camera detected the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
     return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
 def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
-    """Return the share and the delay of reports of the camera with the fault, and of others."""
+    """Compute share and delay of reports of the faulty camera, and the share of other reports."""
     cameras = [np.arange(each.named.shape[1]) for each in episodes]
     mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
     wrong = [

@@ -1,4 +1,4 @@
-"""Steps a second at level `pixels` with every camera in every step, and the time of the stages."""
+"""Steps per second at level `pixels` with every camera in every step, and times of the stages."""
 
 import time
 import warnings
@@ -25,21 +25,21 @@ STAGES: Mapping[str, Sequence[Place]] = {
     "physics": ((Physics, "step"),),
     "motion": ((generator, "advance"), (generator, "watch")),
 }
-"""Stages, as times of the stepping thread.
+"""Functions of each stage, which are timed on the thread that steps.
 
-`detect` is the time of detection without rendering, most of it the network's or waiting for it;
-`track` includes association.
+`detect` is detection without rendering, mostly the network and waiting for it; `track` includes
+association.
 """
 REST = "rest"
 WARM_UP = 10
 """Number of steps before the measurement."""
 ROUNDS = 60
-"""Number of runs with four crops that time the network alone."""
+"""Number of runs with four crops for timing the network alone."""
 LITERT, OPENVINO = "litert", "openvino"
 
 
 class Setting(NamedTuple):
-    """The setting of a time measurement."""
+    """The conditions of a time measurement."""
 
     cameras: int
     workers: int
@@ -48,14 +48,14 @@ class Setting(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name in metrics: numbers, then deviations from the default."""
+        """Name in metrics, with numbers of cameras and workers and deviations from the default."""
         usual = {"lab", LITERT}
         special = (each for each in (self.scene, self.runtime) if each not in usual)
         return ".".join([str(self.cameras), str(self.workers), *special])
 
 
 def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
-    """Return the median time in which two threads process four crops, a lower bound of any loop."""
+    """Measure the median time of four crops on two threads, a lower bound for a step."""
     landmarkers = [load_landmarker(runtime=runtime) for _ in range(2)]
     crop = np.random.default_rng(0).random((LANDMARK_SIDE, LANDMARK_SIDE, 3), np.float32)
     seconds = []
@@ -74,13 +74,13 @@ def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
 def measure(
     setting: Setting, n_steps: int, seed: int, tick: Callable[[float], None]
 ) -> dict[str, Any]:
-    """Return the speed of random actions, and the times of the stages.
+    """Measure the speed with random actions, and the times of the stages.
 
-    After "n" steps as many run with the stopwatch around the stages: "steps_per_s" of the median
-    step, and in "stages" milliseconds per step.
+    The result has "steps_per_s" of the median of "n" steps, and in "stages" milliseconds per step
+    from as many further steps, in which the stages are timed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that one camera is few is known
+        warnings.simplefilter("ignore")  # on the small number of cameras
         env = HRCEnv(
             scene=setting.scene,
             cameras=list(range(setting.cameras)),
@@ -109,7 +109,7 @@ def measure(
 
 
 def _step(env: HRCEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
-    """Return the seconds of each step."""
+    """Take random actions, and return the duration of each step [s]."""
     seconds = []
     for _ in range(n_steps):
         action = actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Crops as rows of a table: by activity, distance and view angle."""
+"""Grouping of crops into rows of tables, by activity, distance, view angle and so on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,9 +13,10 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "raise": ("drill overhead", "climb"),
     "fold": ("lift", "pick up", "set down", "squat", "kneel", "fall"),
 }
-"""Motion families with their activities; every activity is in one.
+"""Families of motions with their activities; every activity is in exactly one.
 
-A judgement: in `fold` trunk or knees are bent far, where the network is weak.
+The assignment is a judgement; in `fold`, trunk or knees are bent far, for which the network is
+weak.
 """
 FAMILY_OF: dict[str, str] = {
     activity: family for family, activities in FAMILIES.items() for activity in activities
@@ -38,7 +39,7 @@ class View:
     distance_m: float
     angle_deg: float
     error: float | None
-    """Mean distance of the joints from the truth as a share of the stature; None: missed."""
+    """Mean error of the joints in the image as a share of the stature; None if not detected."""
 
 
 ROWS: Mapping[str, Callable[[View], str]] = {
@@ -52,13 +53,13 @@ ROWS: Mapping[str, Callable[[View], str]] = {
 }
 """Kinds of rows, each a function from a crop to its row."""
 COMPARED = ("lens", "appearance")
-"""Kinds that compare variants "<kind> <row>" of the same moments; the others use `PLAIN` ones."""
+"""Kinds that compare variants "<kind> <row>" of the same moments; the others use `PLAIN`."""
 PLAIN = "plain"
-"""Variant of the scenes without changes."""
+"""Variant of crops in unchanged scenes."""
 
 
 def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
-    """Return the crops of a kind by row, in the order of the table."""
+    """Group crops by the rows of a kind, in the order of the table."""
     name = ROWS[kind]
     compared = kind in COMPARED
     chosen = [v for v in views if v.variant.startswith(f"{kind} " if compared else PLAIN)]
@@ -67,14 +68,14 @@ def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
 
 
 def list_activities() -> tuple[str, ...]:
-    """Return every activity that a worker does on its own, with the families in turns."""
+    """Return every activity that a worker does on its own, in an order that alternates families."""
     kinds = [[each for each in names if each != "clip"] for names in FAMILIES.values()]
     longest = max(map(len, kinds))
     return tuple(names[k] for k in range(longest) for names in kinds if k < len(names))
 
 
 def family_index(activity: int) -> int:
-    """Return the family of an activity, an index in `FAMILIES`."""
+    """Return the index in `FAMILIES` of the family of an activity."""
     return list(FAMILIES).index(FAMILY_OF[activity_names[activity]])
 
 

@@ -1,4 +1,4 @@
-"""The tracking benchmark on recorded films: every estimator on the same detections."""
+"""The tracking benchmark on recorded films, with the same detections for every estimator."""
 
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
 _DETECTING = 0.5
-"""Share of the progress for detection."""
+"""Share of the progress that detection takes."""
 _LEAD = """\
 Leave-one-camera-out reprojection [px]; best of both sides: where it fits better, left and right of
 the held-out detections are exchanged. Coverage: share of held-out detections within the 95 % region
@@ -66,11 +66,11 @@ class RecordedBench:
     n_parts = 1
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {"recording": POSE2SIM.requirement, "follower": FOLLOWER}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Fetch and detect, then run all estimators; existing detections are used.
+        """Fetch the recording, detect the person or use cached detections, and run all estimators.
 
         Raises:
             DownloadError: the recording is missing and cannot be fetched.

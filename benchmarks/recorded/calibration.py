@@ -1,11 +1,11 @@
-"""The calibration of a recording: from Qualisys' XML to pinhole cameras with a lens.
+"""Reading of a Qualisys calibration (XML) as pinhole cameras with lenses.
 
-Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `world` in metres.
-Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's
-camera (+X right, +Y down, +Z forward) is that turned half round its +X. Lengths in the image
-come in 64ths of a pixel, counted from the middle of the first pixel; here pixels count from
-the image's corner, half a pixel more. Of an image that is narrower than in the
-calibration the right margin was cut off: moving or stretching it makes the views agree less.
+Frames: the world frame of the file is right-handed with +Z up, in millimetres; it becomes `world`
+in metres. The rows of its matrix are the axes of the camera (+X right, +Y up, -Z forward), which
+become those of OpenCV (+X right, +Y down, +Z forward) by a half turn about +X. Lengths in the image
+are in 64ths of a pixel from the centre of the first pixel; here, pixels are counted from the corner
+of the image, which adds half a pixel. If an image is narrower than in the calibration, its right
+margin was cut off: shifting or stretching the image makes the views agree less.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -23,7 +23,7 @@ _HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
 def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[PinholeCamera]:
-    """Return the cameras of a Qualisys calibration file, for films of these widths and heights."""
+    """Read the cameras of a Qualisys calibration file, for films of given widths and heights."""
     found = ElementTree.parse(path).getroot().iter("camera")
     return [_camera(camera, size) for camera, size in zip(found, sizes_px, strict=True)]
 
@@ -40,10 +40,11 @@ def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
 
 
 def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
-    """Return tracker settings for a rig: a prior around the point it looks at, without a floor.
+    """Return tracker settings for a rig, with a prior around the point that its cameras look at.
 
-    The standard deviation of the prior is half the mean distance; the file has no height of the
-    floor.
+    This point is the closest to all optical axes. The standard deviation of the prior is half the
+    mean distance of the cameras from it. There is no floor, since the file does not have its
+    height.
     """
     point = find_meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]

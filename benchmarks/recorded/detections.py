@@ -1,4 +1,4 @@
-"""Detections of the pose network in a recording: made once, stored, and used by every estimator."""
+"""Detections of the pose network in a recording, which are cached and used by every estimator."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -17,10 +17,9 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 
 FOLLOWER = "kalman"
-"""Estimator that predicts the crop windows, another one than the default, which gets no
-advantage."""
+"""Estimator that predicts the crop windows; the default would get an advantage from this."""
 SURE = 0.5
-"""Confidence below which detections do not count."""
+"""Minimum confidence of detections that are evaluated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,16 +27,16 @@ class Detections:
     """Detections of one person in T frames of C cameras."""
 
     px: Points2
-    """Pixels of the pinhole cameras (T, C, J, 2), NaN without a detection."""
+    """Pixels in the pinhole cameras (T, C, J, 2), NaN without a detection."""
     confidence: Floats
-    """Confidence (T, C, J) in [0, 1]."""
+    """Confidence of the detector (T, C, J), in [0, 1]."""
     sigma_px: Floats
-    """Standard deviation of the detector (T, C, J) [px]."""
+    """Standard deviation of the detections (T, C, J) [px]."""
     dt_s: float
     """Time between frames [s]."""
 
     def keypoints(self, t: int, cameras: list[int]) -> Keypoints:
-        """Return the record of frame `t` for some of the cameras."""
+        """Return the keypoints of frame `t` in some of the cameras."""
         px, confidence, sigma = (
             array[t, cameras][None, :, None] for array in (self.px, self.confidence, self.sigma_px)
         )
@@ -45,7 +44,7 @@ class Detections:
 
 
 def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
-    """Return the detections of all films, from the cache or computed."""
+    """Return the detections in all films, computed or from the cache."""
 
     def make(tick: PartProgress) -> dict[str, Any]:
         found = asdict(_detect(films, cameras, tick))
@@ -57,10 +56,10 @@ def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache
 
 
 def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> Detections:
-    """Detect the person in every frame near the predicted position; search without a track.
+    """Detect the person near the predicted position in every frame; search if there is no track.
 
-    A follower with all cameras chooses the windows, so a bystander is not detected: hips at which
-    the lines of sight of most cameras meet win the search.
+    An estimator that uses all cameras predicts the windows. A bystander is not detected, since the
+    search prefers hips at which the lines of sight of most cameras meet.
     """
     pinholes = [replace(camera, lens=None) for camera in cameras]
     dt_s = 1 / films.frames_per_s
@@ -88,7 +87,7 @@ def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> D
 
 
 def _windows(predicted: PoseEstimate, cameras: list[PinholeCamera]) -> list[Roi | None]:
-    """Return a window per camera around the predicted joints; none without a track."""
+    """Return a window per camera around the predicted joints, or None if there is no track."""
     if not predicted.tracked[0, 0]:
         return [None] * len(cameras)
     px, depth_m = project(projections(tuple(cameras)), predicted.mean_world[:, 0])

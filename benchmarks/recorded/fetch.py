@@ -1,8 +1,8 @@
-"""A recording that is fetched once, verified and stored in the user's cache folder.
+"""A recording that is downloaded once, verified, and stored in the user's cache folder.
 
 `Demo_SinglePerson` of Pose2Sim (D. Pagnon et al., BSD-3-Clause): four calibrated cameras film a man
-who balances on a beam beside a bystander; 100 frames at 60 Hz. It is read from the official wheel,
-which is unzipped and never installed.
+who balances on a beam beside a bystander; 100 frames at 60 Hz. It is extracted from the official
+wheel, which is not installed.
 """
 
 from collections.abc import Callable
@@ -34,13 +34,14 @@ class Recording:
 
 
 def fetch_recording(say: Callable[[str], None]) -> Recording:
-    """Return the recording in the cache folder; download it if it is missing.
+    """Return the recording in the cache folder, and download it if it is missing.
 
     Args:
-        say: callback with a sentence on the progress.
+        say: function that receives sentences on the progress.
 
     Raises:
-        DownloadError: no network, no pip, another wheel than expected, or no place to write.
+        DownloadError: there is no network or pip, the wheel is not the expected one, or the folder
+            is not writable.
     """
     folder = fetch(POSE2SIM, say, AGAIN)
     return Recording(folder / _CALIBRATION, tuple(folder / name for name in _FILMS))

@@ -1,4 +1,4 @@
-"""Recorded films as an image source: one frame of every camera at a time."""
+"""Recorded films as an image source, which has one frame of every camera at a time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,12 +13,12 @@ from hrc_env.perception.blazepose import crop_window
 
 
 class Films:
-    """Films of a rig that are read together; an `ImageSource` of the current frames."""
+    """An `ImageSource` of the current frames of a rig's films, which are read together."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        """Open the films; raises `ConfigError` for a file that is not a film."""
+        """Open the films; raise `ConfigError` if a file is not a film."""
         self.frames: list[Image] = []
-        """Current frame of each camera, (H, W, 3) RGB; none before `advance`."""
+        """Current frame of each camera, (H, W, 3) RGB; the list is empty before `advance`."""
         self._films = [cv2.VideoCapture(str(path)) for path in paths]
         for path, film in zip(paths, self._films, strict=True):
             if not film.isOpened():
@@ -31,7 +31,7 @@ class Films:
 
     @property
     def sizes_px(self) -> list[tuple[int, int]]:
-        """Width and height of each camera's frames."""
+        """Width and height of each camera's frames [px]."""
         return [
             (int(film.get(cv2.CAP_PROP_FRAME_WIDTH)), int(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
             for film in self._films
@@ -39,7 +39,7 @@ class Films:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames that all films have, by their headers."""
+        """Number of frames of the shortest film, according to the headers."""
         return min(int(film.get(cv2.CAP_PROP_FRAME_COUNT)) for film in self._films)
 
     def advance(self) -> bool:
@@ -53,7 +53,7 @@ class Films:
         return True
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return the window of a camera's current frame, upright, (256, 256, 3) RGB."""
+        """Return an upright window of a camera's current frame, (256, 256, 3) RGB."""
         return crop_window(self.frames[camera_index], window)
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""Quality of an estimator without ground truth, on recorded films.
+"""Metrics of an estimator on recorded films, without ground truth.
 
-Detections of a held-out camera are predicted; bone lengths should be constant; motion should be
-smooth.
+They are the error of predicted detections in a held-out camera, the variation of bone lengths, and
+the jerk of the motion.
 """
 
 from dataclasses import dataclass, fields
@@ -20,13 +20,13 @@ from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.smoother import smooth
 
 SMOOTHER = "smoother"
-"""Name of the smoother, which is offline: it uses the whole recording."""
+"""Name of the offline smoother, which uses the whole recording."""
 NAMES = [*ESTIMATORS, SMOOTHER]
 """Names of the estimators that run on a recording."""
 CHI2_95_2D = 5.991
-"""Squared Mahalanobis distance of the 95 % region of a normal variable in two dimensions."""
+"""Squared Mahalanobis radius of the 95 % region of a normal distribution in two dimensions."""
 _BLOCK = 10
-"""Number of frames in a block of the bootstrap, as neighbouring frames are alike."""
+"""Number of frames in a block of the bootstrap; neighbouring frames are correlated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,13 +38,13 @@ class Track:
     cov_world: Covariances3
     """Covariances of joint positions (T, J, 3, 3) [m^2]."""
     tracked: Bools
-    """Whether the person is tracked (T,)."""
+    """Mask (T,) of frames in which the person is tracked."""
 
 
 def follow(
     name: str, P: Floats, config: TrackerConfig, detections: Detections, cameras: list[int]
 ) -> Track:
-    """Run an estimator, or the smoother, on some of the cameras of a recording."""
+    """Run an estimator, or the smoother, with some of the cameras of a recording."""
     clip = [detections.keypoints(t, cameras) for t in range(len(detections.px))]
     if name == SMOOTHER:
         belief = smooth(P[cameras], clip, detections.dt_s, config)
@@ -65,19 +65,19 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foretold:
-    """Differences between detections in held-out cameras and their predictions from the others."""
+    """Errors of predicted detections in held-out cameras, computed from the other cameras."""
 
     off_px: Floats
-    """Distance (T, C, J) [px]; NaN for low confidence, or without a track."""
+    """Distance from detections (T, C, J) [px]; NaN for low confidence, or without a track."""
     off_either_px: Floats
-    """The same distance if left and right of a detection are exchanged in frames in which that fits
+    """The same distances; left and right of a detection are swapped in frames in which this fits
     better."""
     inside: Floats
-    """1 if the detection is in the 95 % region of estimate and detector (T, C, J), else 0."""
+    """1 for detections in the joint 95 % region of estimate and detector (T, C, J), otherwise 0."""
 
 
 def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections) -> Foretold:
-    """Hold out each camera once, and predict its detections."""
+    """Predict the detections in each camera from those in the others."""
     n_frames, n_cameras, n_joints = detections.confidence.shape
     off = np.full((3, n_frames, n_cameras, n_joints), np.nan)
     for held in range(n_cameras):
@@ -97,7 +97,7 @@ def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections
 
 
 def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Bools:
-    """Return whether detections are in the 95 % region of estimate and detector (T, J)."""
+    """Return a mask (T, J) of detections in the joint 95 % region of estimate and detector."""
     points = np.concatenate([track.mean_world, np.ones((*track.mean_world.shape[:-1], 1))], -1)
     u, v, w = np.moveaxis(points @ P.T, -1, 0)
     px = np.stack([u / w, v / w], -1)
@@ -110,7 +110,7 @@ def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Boo
 
 
 def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
-    """Return median and 95th percentile [px], also with exchanged sides, and coverage.
+    """Compute median and 95th percentile [px], without and with swapped sides, and coverage.
 
     Intervals are by bootstrap over blocks of frames.
     """
@@ -127,9 +127,9 @@ def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
 
 
 def bone_std(track: Track) -> Metric:
-    """Return the standard deviation of bone lengths over time [m].
+    """Compute the standard deviation of bone lengths over time [m].
 
-    Over bones: the mean, the least and the greatest.
+    The metric is the mean over bones, with the minimum and the maximum.
     """
     joints = track.mean_world[track.tracked]
     lengths = np.linalg.norm(joints[:, BONES[:, 0]] - joints[:, BONES[:, 1]], axis=-1)
@@ -137,9 +137,9 @@ def bone_std(track: Track) -> Metric:
 
 
 def jerk(track: Track, dt_s: float) -> Metric:
-    """Return the root mean squared third difference of positions [m/s^3].
+    """Compute the root mean square of the jerk of joint positions [m/s^3].
 
-    Over joints: all together, the least and the greatest.
+    The metric is that of all joints, with the minimum and the maximum over joints.
     """
     squared = (np.diff(track.mean_world[track.tracked], 3, axis=0) ** 2).sum(-1) / dt_s**6
     return _over(np.sqrt(squared.mean(0)), float(np.sqrt(squared.mean())), "m/s^3")

@@ -1,1 +1,1 @@
-"""The speed benchmark: steps a second of whole environments, and shares of their parts."""
+"""The speed benchmark: steps per second of whole environments, and times of their parts."""

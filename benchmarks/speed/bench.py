@@ -1,7 +1,7 @@
-"""The speed benchmark: all contenders take turns, so that noise of the machine affects all alike.
+"""The speed benchmark, in which all contenders take turns to be equally affected by noise.
 
-A round runs every contender for whole episodes, those at level `keypoints` once more with the
-stopwatch around their parts, and resets; then every id has a turn. Medians over rounds count.
+A round runs every contender for whole episodes, those at level `keypoints` a second time with timed
+parts, and resets. Then every id has its turns. Results are medians over rounds.
 """
 
 import math
@@ -35,50 +35,53 @@ from hrc_env.safety.shield import find_shield
 from hrc_env.tasks.task import find_task
 
 EVERY = "every"
-"""Name that stands for all ids."""
+"""Word that stands for all ids."""
 WATCHED = "keypoints"
 """Level at which the parts of a step are timed."""
 _REACHERS = 64
-"""Number of Reachers in one vector."""
+"""Number of environments in the vector of Reachers."""
 _MAKING = 0.1
-"""Share of the progress for making environments."""
+"""Share of the progress that the creation of environments takes."""
 
 
 Measured = defaultdict[str, list[float]]
-"""One number per round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
+"""One number per round, by "<kind>.<name>".
+
+Configurations in names are "single" and "<num_envs>.<threads>".
+"""
 BY_TASK = "task_steps_per_s"
-"""Kind of the numbers of ids."""
+"""Kind of the numbers that are measured for every id."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedBench:
-    """The experiment, and the amount of data that is measured."""
+    """The experiment, and its amount of data."""
 
     name = "bench speed"
     depends = ("env", "tracker", "emulator", "motion")
     seeds = (0,)
     n_parts = 1
     task: str = OURS
-    """Id of the environment; "every": the speed of each id, and nothing else."""
+    """Id of the environment, or "every" for only the speed of each id."""
     shield: str | None = None
-    """Name of the shield."""
+    """Name of the shield, or None."""
     n_rounds: int = 6
     """Number of rounds."""
     least_steps: int = 4000
-    """Least number of environment steps in a turn; whole episodes are run."""
+    """Minimum number of environment steps in a turn, which is rounded up to whole episodes."""
     n_resets: int = 25
-    """Number of resets of each kind in a round."""
+    """Number of resets of each kind per round."""
     task_steps: int = 200
-    """Steps of each id's vector in a round; none if `task` is not the first id."""
+    """Steps of each id's vector per round, for the default `task` and for "every"."""
     levels: tuple[str, ...] = (WATCHED, "truth", "none")
     """Perception levels."""
     sizes: tuple[int, ...] = (1, 16, 64, 256)
-    """Numbers of environments."""
+    """Numbers of environments in vectors."""
     threads: tuple[int, ...] = (1, 2)
-    """Numbers of threads; those above the number of environments are left out."""
+    """Numbers of threads of vectors; those above the number of environments are left out."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a value is invalid."""
         find_shield(self.shield)
         if self.task != EVERY:
             find_task(self.task)
@@ -88,21 +91,21 @@ class SpeedBench:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """Warning on the tables and figures of a short run, or "" if it is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
         return (
             describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
         )
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Measured:
-        """Return the numbers of all rounds; nothing is stored between runs.
+        """Measure all rounds; nothing is stored between runs.
 
         Raises:
-            HRCError: a function of a part is no longer called, so its time would be missed.
+            HRCError: a timed function is no longer called, and its time would be missed.
         """
         measured = Measured(list)
         if self.task != EVERY:
@@ -117,7 +120,7 @@ class SpeedBench:
 
     @property
     def vectors(self) -> list[tuple[int, int]]:
-        """Numbers of environments and of threads of every vector."""
+        """Pairs of the number of environments and the number of threads of every vector."""
         return [(n, k) for n in self.sizes for k in self.threads if k <= n]
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -126,16 +129,16 @@ class SpeedBench:
         return (make_steps_table(self.levels, configurations), make_organs_table(SHOWN), TASKS)
 
     def report(self, played: Measured, metrics: Metrics, figures: Path) -> Report:
-        """Draw the figure and return the report."""
+        """Plot the figure and return the report."""
         return report(metrics, figures)
 
 
 QUICK = SpeedBench(n_rounds=1, least_steps=1000, task_steps=25)
-"""The quick form: every number, from one short turn."""
+"""The quick form, which computes every number from one short turn."""
 
 
 UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
-"""Units by kind."""
+"""Units of numbers by kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +151,11 @@ class Turn:
     contender: Contender
     n_episodes: int
     cost: float
-    """Approximate share of a round that it takes, in any unit."""
+    """Approximate duration of the turn relative to other turns."""
 
 
 def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """Measure every id."""
+    """Measure the speed of every id."""
     share = (config.task == EVERY) / config.n_rounds
     with closing(Tasks()) as tasks:
         for _ in range(config.n_rounds):
@@ -162,7 +165,7 @@ def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """Measure one id in all sizes, its parts, and resets."""
+    """Measure one id in all configurations, the parts of its steps, and resets."""
     organs = Organs()
     with ExitStack() as exits:
         turns = [*_turns(config, exits, parts.progress)]
@@ -179,7 +182,7 @@ def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
-    """Run a contender; then, if its parts are timed, run it with the stopwatch around them."""
+    """Run a contender; at level `WATCHED`, run it a second time and time its parts."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
     measured[f"env_steps_per_s.{name}"].append(pace.env_steps / pace.seconds)
@@ -190,7 +193,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 
 def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
-    """Yield the turns of all contenders, which are made first and closed in the end."""
+    """Yield the turns of all contenders, which `exits` closes at the end."""
     known = config.vectors
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
@@ -214,7 +217,7 @@ def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator
 
 
 def compute_metrics(measured: Measured) -> dict[str, Metric]:
-    """Return medians over rounds with the smallest and the largest."""
+    """Compute medians over rounds, with the minimum and the maximum."""
     own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
     by_task = {
         name: measured[f"{BY_TASK}.{name}"] for name in list_endings(measured, f"{BY_TASK}.")

@@ -1,6 +1,6 @@
-"""The contenders of the speed benchmark, by public interfaces.
+"""The contenders of the speed benchmark, which use public interfaces only.
 
-They are the environment in all sizes, Gymnasium's Reacher, and resets.
+They are single and vector environments, Gymnasium's Reacher, and resets.
 """
 
 import time
@@ -19,13 +19,12 @@ OURS, PEER = "HRCReach-v0", "Reacher-v5"
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """The result of a run."""
+    """The steps and the duration of a run."""
 
     env_steps: int
-    """Number of steps in which an action was executed; steps that only start an episode do not
-    count."""
+    """Number of steps in which an action was executed, without those that only start an episode."""
     seconds: float
-    """Time from the first action to the last info, including resets [s]."""
+    """Duration from the first action to the last info, including resets [s]."""
 
 
 class Single:
@@ -67,7 +66,7 @@ class Vector:
         return self.run_steps(n_episodes * (self.episode_steps + 1))
 
     def run_steps(self, n_steps: int) -> Pace:
-        """Take random actions for a number of steps of the vector, at any point of its episodes."""
+        """Take random actions for a number of steps of the vector, continuing its episodes."""
         actions = _actions(self.env, n_steps)
         n_starts, ended = 0, self._ended
         started_s = time.perf_counter()
@@ -88,7 +87,7 @@ SOME, MANY = 8, 64
 
 
 class Starts:
-    """A single environment and a vector of 64 on one thread, both at level `keypoints`."""
+    """Resets of a single environment, and of some in a vector of 64 on one thread."""
 
     def __init__(self, id: str = OURS) -> None:
         self.single = gymnasium.make(id, perception="keypoints")
@@ -97,7 +96,7 @@ class Starts:
         self.vector.reset(seed=0)
 
     def run(self, n_resets: int) -> dict[str, float]:
-        """Return mean milliseconds of `reset()` of one environment, and of 8 of 64 in turns."""
+        """Measure the mean time of resets of one environment, and of 8 of 64 in turn [ms]."""
         started_s = time.perf_counter()
         for _ in range(n_resets):
             self.single.reset()
@@ -116,11 +115,11 @@ class Starts:
 
 
 Contender = Single | Vector
-"""A contender that can run some episodes repeatedly."""
+"""A single or vector environment, which runs a number of episodes at each call."""
 
 
 def read(info: Mapping[str, Any]) -> None:
-    """Read every value of an info, as logging does."""
+    """Read every value of an info dictionary, as logging does."""
     for name in info:
         _ = info[name]
 

@@ -1,4 +1,4 @@
-"""The declaration of the speed benchmark: configurations, columns and tables."""
+"""Configurations, columns and tables of the speed benchmark."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,9 +9,9 @@ from hrc_env.tasks import BUILT_IN, DEFAULT
 
 ASKED = "How long does a step take, alone and in a batch, and which parts take the time?"
 SINGLE = "single"
-"""The environment of `gymnasium.make`, unlike a vector of one."""
+"""Configuration of an environment of `gymnasium.make`, as opposed to a vector of one."""
 REACHER = "reacher"
-"""Name of Gymnasium's Reacher among levels."""
+"""Name of Gymnasium's Reacher in place of a perception level."""
 SHOWN = (SINGLE, "16.1", "64.1", "64.2")
 """Configurations for which the documentation shows the parts of a step."""
 RESETS = {
@@ -45,7 +45,7 @@ def title(configuration: str) -> str:
 
 
 def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Table:
-    """Return the table of steps a second.
+    """Return the table of steps per second.
 
     Args:
         levels: perception levels.
@@ -67,7 +67,7 @@ def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Ta
 
 
 def make_organs_table(configurations: Iterable[str]) -> Table:
-    """Return the table of the time of a step, by part.
+    """Return the table of the times of the parts of a step.
 
     Args:
         configurations: configurations in the order of the columns.

@@ -2,10 +2,10 @@
 
     python -m benchmarks.speed.images
 
-All contenders take turns, so that noise of the machine affects all alike: a step without images,
-the same with one and with all images, `render()`, and the rig rendered as for people. Results are
-milliseconds of processor time, medians with quartiles, and shares of `render()` and of a step;
-`--out` writes them as JSON.
+All contenders take turns, to be equally affected by noise of the machine: a step without images,
+with one and with all images, `render()`, and the rig rendered in the style of `render()`. Results
+are milliseconds of processor time, as medians with quartiles, and ratios to `render()` and to a
+step; `--out` writes them as JSON.
 """
 
 import json
@@ -31,20 +31,20 @@ STEP, RENDER = "a step without images", "render(), with shadows"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Measure the time of images."""
+    """Measure the time of camera images in observations."""
 
     rounds: int = 60
     """Number of turns of each contender."""
     size: int = 84
-    """Sides of images and pictures [px]."""
+    """Width and height of images [px]."""
     task: str = "HRCReach-v0"
     """Id of the environment."""
     out: Path | None = None
-    """JSON file for the numbers."""
+    """JSON file for the results."""
 
 
 def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[], Any]]:
-    """Return all contenders, as functions."""
+    """Return a function for each contender, by name."""
     size = arguments.size
 
     def make(**given: Any) -> Any:
@@ -76,7 +76,7 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
 
 
 def measure(arguments: Arguments) -> dict[str, list[float]]:
-    """Return milliseconds of processor time of every turn, by name."""
+    """Measure the processor time of every turn, by name of the contender [ms]."""
     with ExitStack() as exits:
         turns = contenders(arguments, exits)
         took: dict[str, list[float]] = {name: [] for name in turns}
@@ -84,13 +84,13 @@ def measure(arguments: Arguments) -> dict[str, list[float]]:
             for name, turn in turns.items():
                 started_s = time.process_time()
                 turn()
-                if round_ >= 2:  # the first ones draw what stands still
+                if round_ >= 2:  # the first rounds render static objects
                     took[name].append(1e3 * (time.process_time() - started_s))
     return took
 
 
 def main(arguments: Arguments) -> int:
-    """Measure, print a table, and write the numbers; return the exit status."""
+    """Measure the times, print a table, write the results, and return the exit status."""
     took = measure(arguments)
     table = Table("", "ms", "quartiles", "of render()", "of a step")
     numbers = {}

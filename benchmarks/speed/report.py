@@ -1,4 +1,4 @@
-"""The report of the speed benchmark: tables, and a figure of the parts of a step."""
+"""The report of the speed benchmark, with tables and a figure of the parts of a step."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from hrc_env.experiments.plots import label_axes, make_figure, save
 from hrc_env.experiments.report import Metrics, Report, format_picture
 
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
-"""Colours of the parts, of resets and of the rest."""
+"""Colours of the parts, of resets and of the remaining time."""
 SPREAD = "the smallest and the largest of all rounds"
 _ABOUT_THE_ORGANS = """\
 Measured in separate runs with timers around the functions of each part, which cost about half a
@@ -32,7 +32,7 @@ everything else."""
 
 
 def report(metrics: Metrics, figures: Path) -> Report:
-    """Draw organs.png and return the report.
+    """Plot `organs.png` and return the report.
 
     Args:
         metrics: metrics by name.
@@ -61,7 +61,7 @@ def _size(configuration: str) -> tuple[int, str]:
 
 
 def plot_organs(path: Path, metrics: Metrics) -> None:
-    """Draw bars of microseconds per environment and step; one environment is apart from many."""
+    """Plot bars of microseconds per environment step, separately for one and many environments."""
     groups: tuple[list[str], list[str]] = ([], [])
     for each in list_endings(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
@@ -79,13 +79,13 @@ def plot_organs(path: Path, metrics: Metrics) -> None:
 
 
 def _bar_title(configuration: str) -> str:
-    """Return the words below a bar, in two lines for a batch."""
+    """Return the label below a bar, in two lines for a batch."""
     words = title(configuration)
     return words if configuration == SINGLE else f"batch of {words.replace(' on ', chr(10))}"
 
 
 def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
-    """Draw a bar for each configuration, with its parts stacked and the sum above."""
+    """Plot a bar of stacked parts for each configuration, with the total above it."""
     x, foot = np.arange(len(group)), np.zeros(len(group))
     for organ, colour in zip((*ORGANS, REST), _COLOURS, strict=True):
         us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])

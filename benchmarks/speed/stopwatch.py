@@ -1,4 +1,4 @@
-"""A stopwatch that wraps functions from outside, without changes of their code."""
+"""A stopwatch that wraps functions at run time, without changes to their code."""
 
 import threading
 import time
@@ -14,22 +14,22 @@ Place = tuple[Any, str]
 
 @dataclass(slots=True)
 class _Hand:
-    """The sums of one thread."""
+    """The times and calls of one thread."""
 
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: Counter[str] = field(default_factory=Counter)
     within: list[float] = field(default_factory=list)
-    """Seconds of timed calls inside of each open timed call."""
+    """Time of nested timed calls in each timed call that is running [s]."""
     closed: bool = False
-    """Whether a call is open that is timed as a whole."""
+    """Whether a call of a part in `Stopwatch.whole` is running."""
 
 
 class Stopwatch:
-    """Seconds of each part by itself, over all threads.
+    """Measures the exclusive time of each part, summed over all threads.
 
-    Time that a timed call spends in other timed calls counts for those only, so parts add up. Time
-    that a thread waits for another one counts for the part that waits. Inside of the parts named
-    `whole` no other parts are distinguished.
+    Time that a timed call spends in other timed calls counts for the latter only, which makes parts
+    add up. The time of waiting for another thread counts for the part that waits. Within the parts
+    in `whole`, no other parts are timed.
     """
 
     def __init__(self, organs: Mapping[str, Sequence[Place]], whole: Sequence[str] = ()) -> None:
@@ -38,18 +38,18 @@ class Stopwatch:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Return each part's seconds, summed over threads."""
+        """Time of each part, summed over threads [s]."""
         return {organ: sum(hand.seconds[organ] for hand in self._hands) for organ in self.organs}
 
     @property
     def idle(self) -> list[str]:
-        """Return the functions that were never called."""
+        """Names of functions that were never called."""
         places = [format_name(place) for each in self.organs.values() for place in each]
         return [name for name in places if not any(hand.calls[name] for hand in self._hands)]
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Time the calls of all parts inside of the context; functions are restored afterwards."""
+        """Time the calls of all parts in the context, and restore the functions afterwards."""
         kept: list[tuple[Any, str, Any]] = []
         try:
             for organ, places in self.organs.items():
@@ -63,7 +63,7 @@ class Stopwatch:
                 setattr(owner, name, function)
 
     def _wrap(self, organ: str, place: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return a function that is timed."""
+        """Return a wrapper that times a function."""
         closes = organ in self.whole
 
         def call(*arguments: Any, **named: Any) -> Any:
@@ -86,7 +86,7 @@ class Stopwatch:
         return call
 
     def _hand(self) -> _Hand:
-        """Return the sums of this thread."""
+        """Return the times and calls of this thread."""
         try:
             return self._own.hand
         except AttributeError:
@@ -96,7 +96,7 @@ class Stopwatch:
 
 
 def format_name(place: Place) -> str:
-    """Return the full name of a function, as "hrc_env.scene.physics.Physics.step"."""
+    """Return the full name of a function, e.g. "hrc_env.scene.physics.Physics.step"."""
     owner, name = place
     room = f"{owner.__module__}." if isinstance(owner, type) else ""
     return f"{room}{owner.__name__}.{name}"

@@ -1,4 +1,4 @@
-"""The speed of every id relative to the first, by the same interface and in turns."""
+"""The speed of every id relative to the default id, with the same interface and in turns."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,14 +7,14 @@ from hrc_env.core.results import Metric, over
 from hrc_env.tasks import BUILT_IN
 
 WARM_STEPS, THREADS, AT_ONCE = 20, 2, 20
-"""Steps before the measurement, threads of an id's environments, and steps of one turn.
+"""Steps before the measurement, threads of the environments of an id, and steps of one turn.
 
-Short turns let noise of the machine affect all ids alike.
+Turns are short, to let noise of the machine affect all ids equally.
 """
 
 
 class Tasks:
-    """All ids as vectors of 64 on two threads, at level `keypoints` with one worker each."""
+    """A vector of 64 environments on two threads for every id, at `keypoints` with one worker."""
 
     def __init__(self) -> None:
         each = {"perception": "keypoints", "num_threads": THREADS, "n_workers": 1}
@@ -23,7 +23,7 @@ class Tasks:
             vector.run_steps(WARM_STEPS)
 
     def run(self, n_steps: int) -> dict[str, float]:
-        """Return environment steps a second by id; episodes continue between calls."""
+        """Measure environment steps per second by id; episodes continue between calls."""
         paces: dict[str, tuple[int, float]] = dict.fromkeys(self.vectors, (0, 0.0))
         for _ in range(0, n_steps, AT_ONCE):
             for task, vector in self.vectors.items():
@@ -38,9 +38,9 @@ class Tasks:
 
 
 def shares(paces: Mapping[str, Sequence[float]]) -> dict[str, Metric]:
-    """Return the speeds of ids, and their shares of the first id's in the same round.
+    """Compute the speeds of ids, and their ratios to that of the default id in the same round.
 
-    Each is a median with the smallest and the largest round.
+    Each metric is the median over rounds, with the minimum and the maximum.
     """
     found = {f"task_steps_per_s.{task}": over(values, "1/s") for task, values in paces.items()}
     for task, values in paces.items():

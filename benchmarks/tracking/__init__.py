@@ -1,1 +1,1 @@
-"""The tracking benchmark: every estimator on the same sequences, compared with the bound."""
+"""The tracking benchmark, which runs every estimator on the same sequences."""

@@ -1,4 +1,4 @@
-"""Arrival times of frames: constant and random latencies, a lower frame rate, and losses."""
+"""Arrival times of frames, with constant and random latency, a lower frame rate, and losses."""
 
 from typing import NamedTuple
 
@@ -8,14 +8,14 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.typing import Floats, Points2
 
 LONGEST_DELAY_S = 0.5
-"""Greatest delay of a frame that the estimators' memory covers [s]."""
+"""Maximum delay of a frame for which estimators are configured [s]."""
 _LATENCY_S = (0.04, 0.20)
 _JITTER_S = 0.02
 _DROPPED = 0.05
 
 
 class Delivered(NamedTuple):
-    """Frames by the step in which cameras deliver them."""
+    """Frames, arranged by the step in which cameras deliver them."""
 
     px: Points2
     """Pixels (T, S, C, J, 2); NaN without a frame."""
@@ -25,14 +25,14 @@ class Delivered(NamedTuple):
 
 
 def deliver(px: Points2, seeds: list[int]) -> Delivered:
-    """Return the frames that cameras deliver in each step, from frames taken at its end.
+    """Return the frames that cameras deliver in each step, from the frames that they took.
 
-    Every camera has a constant latency of 40 to 200 ms and, for each frame, up to 20 ms more; one
-    in four, sequence by sequence, takes only every other frame; one frame in twenty is lost. Of
-    frames that arrive in the same step the newest is delivered.
+    Every camera has a constant latency of 40 to 200 ms, plus up to 20 ms for each frame. In each
+    sequence one camera takes only every other frame. One frame in twenty is lost. If several frames
+    of a camera arrive in the same step, the newest is delivered.
 
     Args:
-        px: frames (T, S, C, J, 2).
+        px: pixels in the frames (T, S, C, J, 2).
         seeds: seeds of the sequences.
     """
     out = np.full(px.shape, np.nan)
@@ -52,7 +52,7 @@ def deliver(px: Points2, seeds: list[int]) -> Delivered:
 
 
 def restore_times(px: Points2, time_s: Floats) -> Points2:
-    """Return delivered frames (T, S, C, ...) in the steps in which they were taken."""
+    """Move delivered frames (T, S, C, ...) to the steps in which they were taken."""
     out = np.full(px.shape, np.nan)
     now, s, c = np.nonzero(np.isfinite(time_s))
     out[np.rint(time_s[now, s, c] / DT_S).astype(int) - 1, s, c] = px[now, s, c]

@@ -1,7 +1,8 @@
-"""The tracking benchmark: every estimator on the same sequences, compared with the bound.
+"""The tracking benchmark, which runs every estimator on the same sequences.
 
-Each (rig, condition, estimator) is written to DIR/parts as soon as it is complete, so a run that
-was stopped continues there; parts of other versions or settings are computed again.
+The results of each rig, condition and estimator are written to DIR/parts as soon as they are
+complete, and a run that was stopped continues there. Parts of other versions or settings are
+computed again.
 """
 
 import hashlib
@@ -30,31 +31,31 @@ from hrc_env.tracking.estimators import ESTIMATORS
 
 @dataclass(frozen=True, slots=True)
 class TrackingBench:
-    """The experiment, and the amount of data that is used."""
+    """The experiment, and its amount of data."""
 
     name = "bench tracking"
     depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 70
-    """Sequences per rig and condition."""
+    """Number of sequences per rig and condition."""
     first_seed: int = 20_000
-    """Seed of the first sequence; later ones count up.
+    """Seed of the first sequence; it increases by one with each further sequence.
 
-    No setting was chosen on these: seeds 1000 to 1023, 5000 to 5023 and 7000 to 7023 served for
-    that.
+    No setting was chosen on these sequences, but on seeds 1000 to 1023, 5000 to 5023 and 7000 to
+    7023.
     """
     n_matched: int = 140
-    """Matched sequences per rig."""
+    """Number of matched sequences per rig."""
     n_smoothed: int = 18
-    """Number of sequences per rig and condition for the smoother, which is slow; the first ones."""
+    """Number of first sequences per rig and condition on which the slow smoother runs."""
     timing_repeats: int = 7
-    """Number of measurements of the time per update."""
+    """Number of measurements of the time of an update."""
     estimators: tuple[str, ...] = ()
-    """Estimators besides the default, as in `Selection`."""
+    """Names of estimators besides the default, as in `Selection`."""
     sequences: tuple[str, ...] = ()
-    """Sequences, as in `Selection`."""
+    """Names of rigs and conditions, as in `Selection`."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a value is invalid."""
         check_at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
         self.selection.check()
 
@@ -70,19 +71,19 @@ class TrackingBench:
 
     @property
     def n_parts(self) -> int:
-        """Number of parts: estimators on every condition, and their times."""
+        """Number of parts, one for each estimator on each condition, and for its time."""
         run = self.selection
         return sum(len(run.names_of(each)) for _, each in run.conditions()) + len(run.timed())
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """Warning on the tables and figures of a short run, or "" if it is long enough."""
         return (
             describe_quick_run(self.n_seeds, find_durations()) if is_as_short(self, QUICK) else ""
         )
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         bench = asdict(self)
         for name in ("estimators", "sequences"):
             if not bench[name]:
@@ -96,9 +97,9 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return the parts of all estimators; times are measured alone, at the end.
+        """Return the parts of all estimators; times are measured at the end, one after the other.
 
-        A part does not depend on the selection of others.
+        A part does not depend on which other parts are selected.
         """
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
         cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
@@ -121,7 +122,7 @@ class TrackingBench:
 
 
 QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
-"""The quick form: every number, from fewer sequences."""
+"""The quick form, which computes every number from fewer sequences."""
 
 
 def make_part(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
@@ -141,12 +142,12 @@ def _run(
 
 @lru_cache(maxsize=1)
 def _make_sequences(rig_name: str, condition: str, seeds: tuple[int, ...]) -> Sequences:
-    """Return the sequences of a condition, which its estimators share; the last ones are cached."""
+    """Return the sequences of a condition; the last ones are cached for other estimators."""
     return make_sequences(_rig(rig_name), condition, list(seeds))
 
 
 def extend_key(name: str, key: str) -> str:
-    """Return the key of an estimator's parts, which for users' estimators contains their file."""
+    """Return the key of an estimator's parts, which depends on the source of a custom estimator."""
     source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
@@ -163,7 +164,7 @@ def _rig(name: str) -> Rig:
 
 
 def _timing(config: TrackingBench, parts: PartCache) -> Parts:
-    """Return microseconds per update of every estimator, on the lab's sequences."""
+    """Measure microseconds per update of every estimator, on sequences in the lab."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats

@@ -1,12 +1,12 @@
 """The posterior Cramer-Rao bound of tracking a whole body.
 
-Tichavsky, Muravchik and Nehorai, IEEE Trans. Signal Processing 46, 1998: no estimator's mean
-squared error is below the inverse of the information J, which grows by
+Tichavsky, Muravchik and Nehorai, IEEE Trans. Signal Processing 46, 1998: the mean squared error of
+an estimator is at least the inverse of the information J, which evolves by
 
-    J' = (A J^-1 A' + Q)^-1 + sum over cameras H'H / sigma^2,
+    J' = (A J^-1 A' + Q)^-1 + sum over cameras H'H / sigma^2.
 
-with A, Q (of the transition) and H taken at the truth of each drawn sequence, as is usual;
-written here in covariances.
+As usual, A and Q of the transition and H of the cameras are evaluated at the truth of each drawn
+sequence. The recursion is implemented with covariances.
 """
 
 import numpy as np
@@ -18,12 +18,12 @@ from hrc_env.geometry.cameras import project
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:
-    """Return the information (S, J, 3, 3) of one frame of detections about each joint [1/m^2].
+    """Return the Fisher information (S, J, 3, 3) of a frame of detections on each joint [1/m^2].
 
     Args:
         P: projections of the cameras (C, 3, 4).
         joints: joint positions (S, J, 3) [m].
-        seen: which joints each camera detects (S, C, J).
+        seen: mask (S, C, J) of joints that a camera detects.
         sigma_px: standard deviation of a detection [px].
     """
     px, depth = project(P, joints)
@@ -40,10 +40,15 @@ def posterior_bound(
     sigma_px: float,
     start_std: tuple[float, float] = (1.5, 1.0),
 ) -> Covariances3:
-    """Return a bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
+    """Return a lower bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
 
-    Sequences (T, S, J, 3) [m] are drawn from the model, with detections where `seen` (T, S, C, J)
-    is true; `start_std` is that of positions [m] and velocities [m/s] before the first frame.
+    Args:
+        P: projections of the cameras (C, 3, 4).
+        model: motion model.
+        joints: joint positions (T, S, J, 3) [m], drawn from the model.
+        seen: mask (T, S, C, J) of joints that a camera detects.
+        sigma_px: standard deviation of a detection [px].
+        start_std: standard deviations of positions [m] and velocities [m/s] before the first frame.
     """
     n_frames, n_sequences = joints.shape[:2]
     start = np.repeat(np.square(start_std), N_PLACES)
@@ -59,7 +64,7 @@ def posterior_bound(
 
 
 def _shrink(cov: Floats, information: Floats) -> Floats:
-    """Return covariances (S, n, n) after information (S, m, m) about the first m states."""
+    """Update covariances (S, n, n) with information (S, m, m) on the first m states."""
     m = information.shape[-1]
     gain = np.linalg.solve(np.eye(m) + information @ cov[:, :m, :m], information)
     after = cov - cov[:, :, :m] @ gain @ cov[:, :m]

@@ -1,4 +1,4 @@
-"""One cell of the tracking benchmark: an estimator on the sequences of a rig and a condition."""
+"""Cells of the tracking benchmark: an estimator on the sequences of a rig and a condition."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,26 +25,25 @@ from hrc_env.tracking.smoother import smooth
 UNKNOWN_M2 = 1e6
 """Variance of an unknown bone length [m^2]."""
 _AT_ONCE = 10
-"""Number of sequences that are smoothed together; the smoother stores 90x90 numbers of every
-frame."""
+"""Number of sequences that are smoothed together; the smoother stores 90x90 numbers per frame."""
 
 
 class Belief(NamedTuple):
     """The estimate after a frame."""
 
     mean_world: Points3
-    """(S, W, J, 3) positions of joints [m]."""
+    """Estimated positions of joints (S, W, J, 3) [m]."""
     cov_world: Covariances3 | None
-    """(S, W, J, 3, 3) their covariances [m^2]; None for an estimator without."""
+    """Covariances of these (S, W, J, 3, 3) [m^2], or None if the estimator has none."""
 
 
 class TrackedFrame(NamedTuple):
-    """One frame of an estimator that runs as in an environment."""
+    """Input and output of an estimator in one frame."""
 
     keypoints: Keypoints
     """Detections after association with the tracks."""
     estimate: PoseEstimate
-    """Estimate after the update."""
+    """Estimate after the update with the detections."""
 
 
 def beliefs(name: str, rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
@@ -59,7 +58,7 @@ def beliefs(name: str, rig: Rig, sequences: Sequences, seeds: list[int]) -> Iter
 
 
 def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[Belief]:
-    """Yield triangulations of each frame; a joint without two views stays at its last place."""
+    """Yield triangulations of each frame; joints without two views keep their last position."""
     shape = sequences.joints.shape[1:]
     last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
     for px in sequences.px:
@@ -70,9 +69,10 @@ def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[Belief]:
 def _estimate(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[TrackedFrame]:
-    """Yield the input and the estimate of an estimator that runs as in an environment.
+    """Yield input and output of an estimator in each frame, as in an environment.
 
-    With several people, poses are assigned to the tracks with predictions that they fit.
+    If there are several people, detected poses are assigned to the tracks with predictions that
+    they fit.
     """
     n_sequences, n_people = sequences.joints.shape[1:3]
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
@@ -91,9 +91,9 @@ def _estimate(
 
 
 def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
-    """Yield the results of the smoother, which uses late frames at their own time.
+    """Yield the results of the smoother, which uses late frames at the time they were taken.
 
-    With several people it smooths the tracks to which `kalman` assigned the poses.
+    If there are several people, it smooths the tracks to which `kalman` assigned the poses.
     """
     if sequences.time_s is not None:
         px = restore_times(sequences.px, sequences.time_s)
@@ -116,7 +116,7 @@ def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief
 
 
 def _forget_bones(state: Any) -> None:
-    """Set bone lengths of an estimator, or of each of its hypotheses, to unknown."""
+    """Set the bone lengths in all hypotheses of an estimator to unknown."""
     trees = getattr(state, "trees", None)
     if trees is not None:
         trees["bone_variance"][...] = UNKNOWN_M2
@@ -125,7 +125,7 @@ def _forget_bones(state: Any) -> None:
 def run_cell(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: PartProgress
 ) -> dict[str, Any]:
-    """Run one estimator; return sums per sequence of each window, as of `tally`."""
+    """Run an estimator; return the sums of `tally` per sequence for each window."""
     n_frames = len(sequences.joints)
     means = np.empty(sequences.joints.shape)
     covs = np.empty((*sequences.joints.shape, 3)) if name != DLT else None
@@ -143,7 +143,7 @@ def run_cell(
 def _window(
     frames: slice, sequences: Sequences, means: Points3, covs: Covariances3 | None
 ) -> dict[str, Any]:
-    """Return the sums of one window; several people are each compared with one track."""
+    """Return the sums of one window; each person is compared with one track."""
     truth, mean = sequences.joints[frames], means[frames]
     cov = None if covs is None else covs[frames]
     swaps = None
@@ -161,9 +161,12 @@ def _window(
 
 
 def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
-    """Return sums by name, as lists over sequences, of joints and estimates (T, S, W, J, 3) [m].
+    """Sum up errors by name, as lists over sequences.
 
-    Covariances [m^2] may be missing.
+    Args:
+        truth: true joint positions (T, S, W, J, 3) [m].
+        mean: estimated joint positions (T, S, W, J, 3) [m].
+        cov: covariances of these (T, S, W, J, 3, 3) [m^2], or None.
     """
     n_frames, n_sequences = truth.shape[:2]
     offset = mean - truth

@@ -1,4 +1,4 @@
-"""Two people walking past each other, and detections that are not labelled by person."""
+"""Two people that walk past each other, with detections that are not labelled by person."""
 
 import itertools
 from typing import NamedTuple
@@ -12,19 +12,16 @@ from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
 
 MEETING_S = 3.0
-"""Time at which the two are side by side [s]."""
+"""Time at which the two people are side by side [s]."""
 APART_M = 0.6
-"""Distance between their middles at that time [m]."""
+"""Distance between their centres at that time [m]."""
 _TRUNK_M, _LEAST_JOINTS = 0.18, 6
 _LOST_EVERY_S, _LOST_S = 4.0, (0.2, 0.8)
 _SURE_M = 0.3
 
 
 def walk_couples(seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, 2, J, 3) [m] of two walkers on parallel lines.
-
-    They walk in opposite directions.
-    """
+    """Return joints (T, S, 2, J, 3) [m] of two walkers in opposite directions."""
     rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
     along = np.stack([rng.uniform(0, 2 * np.pi) for rng in rngs])
     middle = np.stack([rng.uniform(-0.2, 0.2, 2) for rng in rngs])
@@ -51,10 +48,11 @@ def walk_couples(seeds: list[int], n_frames: int) -> Points3:
 
 
 def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
-    """Return pixels (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN for missing detections.
+    """Return detections (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN if they are missing.
 
-    Joints are lost as in `occluded`; a trunk hides the person behind it; each camera loses each
-    person for 0.2-0.8 s every 4 s, and reports no person with fewer than six joints.
+    Joints are lost as in `occluded`, and a trunk hides joints of the other person behind it. On
+    average every 4 s, each camera loses each person for 0.2-0.8 s. A person with fewer than six
+    joints is not reported.
     """
     damage = Damage(occluded=True)
     px = np.stack(
@@ -69,25 +67,25 @@ def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
 
 
 def draw_shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
-    """Return the order in which each camera reports people (T, S, C, D), drawn in every frame."""
+    """Draw the order (T, S, C, D) in which each camera reports people in every frame."""
     one = np.tile(np.arange(n_people), (n_frames, n_cameras, 1))
     return np.stack([np.random.default_rng([seed, 8]).permuted(one, axis=-1) for seed in seeds], 1)
 
 
 class Identities(NamedTuple):
-    """Tracks of the people in some sequences."""
+    """Assignment of tracks to people in S sequences."""
 
     track: Ints
-    """Track of each person in the first frame, (S, W)."""
+    """Index of each person's track in the first frame (S, W)."""
     n_changes: Floats
-    """Number of later changes of the assignment, (S,)."""
+    """Number of later changes of the assignment (S,)."""
 
 
 def match_identities(truth: Points3, mean: Points3) -> Identities:
     """Assign tracks to people, and count later changes of the assignment.
 
-    Tracks are those nearest in the first frame, all together; changes are to tracks that are nearer
-    by more than 0.3 m. People and tracks are (T, S, W, J, 3).
+    The assignment has the minimum total distance in the first frame. It changes if another one is
+    nearer by more than 0.3 m in total. True and estimated joints are (T, S, W, J, 3) [m].
     """
     n_sequences, n_people = truth.shape[1:3]
     orders = np.array(list(itertools.permutations(range(n_people))))
@@ -105,7 +103,7 @@ def match_identities(truth: Points3, mean: Points3) -> Identities:
 
 
 def _find_hidden(P: Floats, joints: Points3) -> Bools:
-    """Return joints with lines of sight that pass the other person's trunk (T, S, C, 2, J)."""
+    """Return a mask (T, S, C, 2, J) of joints that the other person's trunk hides."""
     hidden = np.zeros((*joints.shape[:2], len(P), *joints.shape[2:4]), bool)
     for c, camera in enumerate(P):
         eye = -np.linalg.solve(camera[:, :3], camera[:, 3])
@@ -115,7 +113,7 @@ def _find_hidden(P: Floats, joints: Points3) -> Bools:
 
 
 def _passes(to_joints: Points3, to_other: Points3) -> Bools:
-    """Return whether lines of sight pass a nearer trunk (T, S, J), seen from the camera."""
+    """Return a mask (T, S, J) of joints that a nearer trunk hides from the camera."""
     shoulders = to_other[..., [JOINT["left_shoulder"], JOINT["right_shoulder"]], :].mean(-2)
     ankles = to_other[..., [JOINT["left_ankle"], JOINT["right_ankle"]], :].mean(-2)
     length = np.linalg.norm(to_joints, axis=-1)
@@ -130,7 +128,7 @@ def _passes(to_joints: Points3, to_other: Points3) -> Bools:
 
 
 def _draw_losses(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
-    """Return whether a camera has lost a person (T, C, 2)."""
+    """Draw a mask (T, C, 2) of frames in which a camera has lost a person."""
     lost = np.zeros((n_frames, n_cameras, 2), bool)
     for c, k in itertools.product(range(n_cameras), (0, 1)):
         t = rng.exponential(_LOST_EVERY_S / DT_S)

@@ -1,4 +1,4 @@
-"""The declaration of the tracking benchmark: rows, kinds of metrics, and tables."""
+"""Rows, kinds of metrics, and tables of the tracking benchmark."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from hrc_env.experiments.report import Cells, Table
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of metric that every estimator has in every row."""
+    """A kind of metric that is computed for every estimator and row."""
 
     title: str
     digits: int
@@ -35,7 +35,7 @@ KINDS = {
     "std_over_rmse": Kind("Reported standard deviation / RMSE", 2),
     "facing_wrong": Kind("Percent of frames in which the torso faces the wrong way", 2, 100),
 }
-"""Kinds by their names in metrics: each is a table with one row per window."""
+"""Kinds by their names in metrics; each has a table with one row per window."""
 SHOWN = (
     ("rmse_m", DEFAULT, f"`{DEFAULT}` [cm]"),
     ("coverage95", DEFAULT, "coverage"),
@@ -48,14 +48,14 @@ SHOWN = (
     ("rmse_m", SMOOTHER, f"`{SMOOTHER}` [cm]"),
     ("coverage95", SMOOTHER, "coverage"),
 )
-"""Kinds, estimators and headings in the documentation."""
+"""Columns in the documentation: kind, estimator and heading."""
 WORDS = {
     "one_camera_half_second": "one camera, first 0.5 s",
     "one_camera_one_second": "one camera, first 1 s",
     "one_camera_two_seconds": "one camera, first 2 s",
     "one_camera": "one camera, 4 s",
 }
-"""Descriptions of windows with names that are not plain."""
+"""Descriptions of windows in tables, if they differ from the names of the windows."""
 BATCHES = {"64": "batch of 64 [us]", "hard_64": "batch of 64, `hard` [us]", "1": "alone [us]"}
 
 
@@ -81,7 +81,7 @@ def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Ta
 
 
 def times(names: Sequence[str]) -> Table:
-    """Return the table of times.
+    """Return the table of the times of updates.
 
     Args:
         names: names of the estimators.

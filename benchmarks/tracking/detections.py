@@ -1,6 +1,6 @@
 """Simulated detections of walkers.
 
-They have noise, lasting errors, occlusion, gross errors and exchanged sides.
+They have noise, correlated errors, occlusion, gross errors, and swapped left and right.
 """
 
 from dataclasses import dataclass
@@ -22,26 +22,26 @@ class Damage:
     """The errors of simulated detections."""
 
     sigma_px: float = SIGMA_PX
-    """White noise on each coordinate [px]."""
+    """Standard deviation of white noise on each coordinate [px]."""
     drift_px: float = 0.0
-    """Standard deviation of errors that last half a second, on each coordinate [px].
+    """Standard deviation of errors with a correlation time of 0.5 s, on each coordinate [px].
 
-    Estimators get no information about it.
+    Estimators get no information about these errors.
     """
     occluded: bool = False
     """Whether joints are occluded.
 
-    Each camera loses each joint for 0.5-2 s every 5 s; every 6 s a joint keeps only one camera for
-    0.5-1.5 s, or, one time in five, none for 0.4-0.8 s.
+    On average every 5 s, each camera loses each joint for 0.5-2 s. On average every 6 s, only one
+    camera sees a joint for 0.5-1.5 s or, in one of five cases, none for 0.4-0.8 s.
     """
     gross: float = 0.0
-    """Share of detections that are gross errors, as wide as a third of the body."""
+    """Share of gross errors, with a standard deviation of about a third of the body's size."""
     swapped: float = 0.0
-    """Share of the time in which a camera exchanges left and right, 6 frames at a time."""
+    """Share of the time in which a camera swaps left and right, for about 6 frames at a time."""
     mirrored_start: bool = False
-    """Two cameras exchange left and right in the first frame."""
+    """Whether two cameras swap left and right in the first frame."""
     alone_s: tuple[float, float] | None = None
-    """Begin and end of the time in which one camera sees the body, the others nothing [s]."""
+    """Start and end of the time in which only one camera sees the body [s]."""
 
 
 CONDITIONS: dict[str, Damage] = {
@@ -66,14 +66,14 @@ SURPRISES: dict[str, Damage] = {
         Damage(alone_s=(1.0, 6.0)),
     ),
 }  # fmt: skip
-"""Errors by the conditions of `tests/properties/test_sudden_motions.py`."""
+"""Errors for each condition of `tests/properties/test_sudden_motions.py`."""
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:
-    """Return pixels (T, S, C, J, 2) of joints (T, S, J, 3), NaN for missing detections.
+    """Return detections (T, S, C, J, 2) of joints (T, S, J, 3), NaN if they are missing.
 
-    Each seed and each kind of error has its own stream, so that conditions differ by their errors
-    alone.
+    Each seed and kind of error has a random stream of its own, which makes conditions differ in
+    their errors only.
     """
     exact, depth = project(P, joints)
     exact, depth = exact.swapaxes(1, 2), depth.swapaxes(1, 2)
@@ -86,7 +86,7 @@ def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Poin
 
 
 def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
-    """Return the pixels of one sequence, from (T, C, J, 2) and (T, C, J)."""
+    """Return the detections of one sequence, from exact pixels and a mask of joints in view."""
     rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(5)]
     px = exact + damage.sigma_px * rngs[0].standard_normal(exact.shape)
     if damage.drift_px:
@@ -115,10 +115,7 @@ def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points
 
 
 def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Return stationary noise (T, ...) of unit variance.
-
-    Its correlation over time is exp(-t / 0.5 s).
-    """
+    """Draw stationary noise (T, ...) of unit variance with the autocorrelation exp(-t / 0.5 s)."""
     keep = np.exp(-DT_S / _DRIFT_TAU_S)
     drift = rng.standard_normal(shape)
     for t in range(1, len(drift)):
@@ -127,7 +124,7 @@ def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
 
 
 def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
-    """Return whether a camera can see a joint (T, C, J)."""
+    """Draw a mask (T, C, J) of joints that are not occluded."""
     n_frames, n_cameras, n_joints = shape
     free = np.ones(shape, bool)
     for c in range(n_cameras):
@@ -149,7 +146,7 @@ def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
 
 
 def _swaps(rng: np.random.Generator, shape: tuple[int, ...], share: float) -> Bools:
-    """Return whether a camera exchanges left and right (T, C)."""
+    """Draw a mask (T, C) of frames in which a camera swaps left and right."""
     n_frames, n_cameras = shape
     swapped = np.zeros(shape, bool)
     pause = 6 / share * (1 - share)

@@ -1,7 +1,7 @@
-"""A yardstick: plain direct linear transformation, frame by frame.
+"""Plain triangulation of each frame by direct linear transformation, as a reference.
 
-Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. No weights, no gate, no
-refinement; a joint that fewer than two cameras see keeps its position. Its error measures the
+Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. There are no weights, gates or
+refinement, and a joint that fewer than two cameras see keeps its position. The error measures the
 difficulty of a set of sequences.
 """
 
@@ -11,7 +11,7 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:
-    """Return points (S, J, 3) from one frame of pixels (S, C, J, 2), which are NaN if missing.
+    """Triangulate points (S, J, 3) from pixels (S, C, J, 2), which are NaN if missing.
 
     Joints that fewer than two cameras see keep their `last` position.
     """

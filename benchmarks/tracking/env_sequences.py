@@ -1,8 +1,9 @@
-"""An independent second source of motion: the environment's own worker and its detector.
+"""A second, independent source of sequences: the environment's worker and its detector.
 
-The bench's walkers (`walks`) and the environment's worker (`hrc_env.motion`) share no
-code, and neither do the bench's white detections and the environment's emulator, whose errors
-last for half a second, have heavy tails and come with honest or dishonest confidence.
+The walkers of the benchmark (`walks`) and the environment's worker (`hrc_env.motion`) share no
+code. Neither do their detections: errors in the benchmark are white, while those of the
+environment's emulator last for half a second, have heavy tails, and may disagree with the reported
+confidence.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,18 +20,18 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.geometry.sight import Surroundings, no_surroundings
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
-"""Name of the rig with the environment's room and its four cameras."""
+"""Name of the rig of the environment's room with four cameras."""
 ENV_CONDITIONS = ("four_cameras", "two_cameras", "one_camera", "occluded")
 """Conditions of the rig.
 
-Without obstacles: all cameras, the first two, and all but for 4 s with only one; then all with the
-room and a moving robot in their lines of sight.
+The first three are without occlusion: all cameras, the first two, and only one for 4 s. In
+`occluded`, the room and a moving robot occlude the worker.
 """
 ENV_FRAMES = 150
 ALONE_FRAMES = slice(25, 125)
@@ -38,7 +39,7 @@ _SLOWNESS = 0.95
 
 
 def make_env_rig() -> Rig:
-    """Return the environment's cameras and tracker settings."""
+    """Return the rig with the environment's cameras and tracker settings."""
     simulation = simulate(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
@@ -49,13 +50,13 @@ class EnvSequences(NamedTuple):
     """One episode of the environment per seed."""
 
     joints_world: Points3
-    """Joints, (T, S, 1, J, 3) [m]."""
+    """True joints (T, S, 1, J, 3) [m]."""
     keypoints: Keypoints
-    """Keypoints, (T, S, C, 1, J, ...)."""
+    """Detected keypoints (T, S, C, 1, J, ...)."""
 
 
 def record(condition: str, seeds: list[int]) -> EnvSequences:
-    """Return the sequences of a condition."""
+    """Return the sequences of a condition, one per seed."""
     episodes = _play_episodes(tuple(seeds))
     if condition == "occluded":
         return EnvSequences(episodes.joints_world, episodes.hidden)
@@ -70,7 +71,7 @@ def record(condition: str, seeds: list[int]) -> EnvSequences:
 
 
 def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
-    """Return keypoints without those that are `blind` (..., C, W, J)."""
+    """Return keypoints, with those in the mask `blind` (..., C, W, J) set to missing."""
     return Keypoints(
         np.where(blind[..., None], np.nan, keypoints.px),
         np.where(blind, 0.0, keypoints.confidence),
@@ -81,7 +82,7 @@ def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
 def watch(
     simulation: Simulation, seeds: Sequence[int], pushes: list[np.random.Generator], n_frames: int
 ) -> Iterator[tuple[WorkerTruth, Surroundings]]:
-    """Yield the workers and their surroundings, while the robot moves slowly as `pushes` draw."""
+    """Yield workers and their surroundings, while the robot moves slowly at random (`pushes`)."""
     simulation.reset(np.arange(len(seeds)), [np.random.default_rng([seed, 9]) for seed in seeds])
     action = np.zeros((len(seeds), simulation.n_actions))
     for _ in range(n_frames):
@@ -94,7 +95,7 @@ def watch(
 
 
 class EmulatedDetector:
-    """The emulator for some seeds: keypoints of the truth, frame by frame."""
+    """The emulator for a batch of seeds, which returns keypoints of true poses in each frame."""
 
     def __init__(self, simulation: Simulation, rngs: list[np.random.Generator]) -> None:
         self.config, self.cameras, self.rngs = simulation.config, simulation.scene.cameras, rngs
@@ -104,20 +105,20 @@ class EmulatedDetector:
         emulator.reset(self.state, np.arange(len(rngs)), rngs)
 
     def detect(self, truth: WorkerTruth, between: Surroundings) -> Keypoints:
-        """Return the detections of the truth with the given surroundings."""
+        """Return emulated detections of true poses in the given surroundings."""
         settings = self.config.emulator
         return emulator.emulate(self.state, self.rngs, truth, between, self.cameras, settings)
 
 
 class _Episodes(NamedTuple):
-    """Episodes of the environment with both kinds of keypoints."""
+    """Episodes of the environment, with keypoints without and with occlusion."""
 
     joints_world: Points3
-    """Joints, (T, S, 1, J, 3) [m]."""
+    """True joints (T, S, 1, J, 3) [m]."""
     free: Keypoints
-    """Keypoints with free lines of sight."""
+    """Keypoints without occlusion."""
     hidden: Keypoints
-    """Keypoints occluded by the robot and the scene."""
+    """Keypoints with occlusion by the robot and the scene."""
 
 
 @lru_cache(maxsize=1)
@@ -149,6 +150,8 @@ def _stack(records: list[Keypoints]) -> Keypoints:
 
 
 def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
-    """Return environments without rendered cameras."""
+    """Create a batch of environments without perception."""
     config = config or HRCConfig()
-    return Simulation(batch, settle(perception="none", estimator="triangulation", config=config))
+    return Simulation(
+        batch, resolve_settings(perception="none", estimator="triangulation", config=config)
+    )

@@ -1,10 +1,10 @@
-"""Motion drawn from the estimators' own model, for which a bound on any estimator is known.
+"""Motion drawn from the motion model of the estimators, with a known bound on estimation errors.
 
-The state is all joints' positions and velocities, 90 numbers: x' = f(x) + w, w ~ N(0, Q). f damps
-every joint towards its place on the body about the root (the torso's middle), which turns with the
-torso; Q has each joint's own noise and an acceleration that all joints share. The bodies have no
-bones: the Gaussian estimators describe them except for the places on the body, which they learn,
-and the turning, whose error they ignore.
+The state has 90 numbers, the positions and velocities of all joints: x' = f(x) + w, w ~ N(0, Q). f
+damps every joint towards its position on the body relative to the root (the centre of the torso),
+which turns with the torso. Q consists of noise of each joint and an acceleration that all joints
+share. The bodies have no bones. The model of the Gaussian estimators is the same except for the
+positions on the body, which they learn, and the heading, whose error they ignore.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from hrc_env.tracking.tree.state import STANDING_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS
-"""Number of positions in the state [m], joint by joint; velocities [m/s] follow."""
+"""Number of position coordinates in the state [m], followed by as many velocities [m/s]."""
 _LEFT_RIGHT = np.zeros(N_JOINTS)
 _LEFT_RIGHT[TORSO] = (0.5, -0.5, 0.5, -0.5)
 _WARM_UP_FRAMES = 50
@@ -27,27 +27,27 @@ _WARM_UP_FRAMES = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedModel:
-    """A body that moves by the estimators' model."""
+    """A body that moves by the motion model of the estimators."""
 
     F: Floats
-    """Motion of (position, velocity) relative to the joint's place on the body (J, 2, 2)."""
+    """Transition of (position, velocity) relative to the joint's position on the body (J, 2, 2)."""
     Q: Floats
-    """Process noise (90, 90)."""
+    """Covariance of the process noise (90, 90)."""
     linear: Floats
-    """Derivative of f without the turning of the body (90, 90)."""
+    """Derivative of f for a fixed heading of the body (90, 90)."""
     offset: Floats
-    """Places on the body (J, 3): forward, left and up of the root [m]."""
+    """Positions on the body relative to the root (J, 3): forward, left and up [m]."""
 
 
 def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel:
-    """Return the motion model of `tracking.tree.predict` as one of the whole body at 25 Hz.
+    """Return the motion model of `tracking.tree.predict` for the whole body at 25 Hz.
 
-    The settings are those of `ParticleConfig`.
+    The arguments are settings of `ParticleConfig`.
     """
     F, own = discretise_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)
-    # what of the root's (position, velocity) a joint takes along; the rest is its own
+    # share of the root's (position, velocity) that a joint follows
     along = np.array([[1, DT_S], [0, 1]]) - F
     linear = np.block(
         [[np.diag(F[:, i, k]) + along[:, i, k, None] * average for k in (0, 1)] for i in (0, 1)]
@@ -66,10 +66,10 @@ def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel
 
 
 def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of one body per seed.
+    """Draw joints (T, S, J, 3) [m] of one body per seed.
 
-    Limbs are released two seconds before frame 0; until then the root is held at rest over the
-    origin, so that the body, which drifts without bound, stays in view for a while.
+    The motion begins two seconds before frame 0. Until frame 0, the root is held at rest above the
+    origin, since the body drifts without bound and should stay in view for a while.
     """
     rngs = [np.random.default_rng([seed, 3]) for seed in seeds]
     place = model.offset + np.array([0.0, 0.0, 1.0])
@@ -87,9 +87,9 @@ def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
 
 
 def _centre(state: Floats) -> Floats:
-    """Return the state with the root over the origin and at rest.
+    """Shift a state to move the root above the origin and to rest.
 
-    f allows to shift all joints alike.
+    f is invariant to such shifts of all joints.
     """
     body = state.reshape(len(state), 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
@@ -98,7 +98,7 @@ def _centre(state: Floats) -> Floats:
 
 
 def advance(model: MatchedModel, state: Floats) -> Floats:
-    """Return f, the expected state (S, 90) one frame later."""
+    """Evaluate f, which returns the expected state (S, 90) one frame later."""
     body = state.reshape(-1, 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
     anchor = root[:, 0] + _rotate(model.offset, heading(body[:, 0]))
@@ -115,7 +115,7 @@ def advance(model: MatchedModel, state: Floats) -> Floats:
 
 
 def transition(model: MatchedModel, joints: Points3) -> Floats:
-    """Return the derivative of f (S, 90, 90) for bodies with joints at (S, J, 3)."""
+    """Return the derivative of f (S, 90, 90) for bodies with joints (S, J, 3)."""
     angle = heading(joints)
     left = np.einsum("j,sji->si", _LEFT_RIGHT, joints)
     width2 = (left[:, :2] ** 2).sum(-1)
@@ -133,13 +133,13 @@ def transition(model: MatchedModel, joints: Points3) -> Floats:
 
 
 def heading(joints: Points3) -> Floats:
-    """Return the heading (S,) of bodies (S, J, 3) from the torso's left-right line [rad]."""
+    """Return the heading (S,) of bodies (S, J, 3), from the left-right axis of the torso [rad]."""
     left = np.einsum("j,sji->si", _LEFT_RIGHT, joints)
     return np.arctan2(left[:, 1], left[:, 0]) - np.pi / 2
 
 
 def _rotate(offset: Floats, angle: Floats) -> Floats:
-    """Return offsets (S, J, 3) rotated about the vertical."""
+    """Rotate offsets (J, 3) about the vertical axis by angles (S,); return (S, J, 3)."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = offset.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z + 0 * cos], -1)

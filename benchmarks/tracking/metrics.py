@@ -1,4 +1,4 @@
-"""Metrics from sums per sequence, with bootstrap intervals over sequences."""
+"""Computation of metrics from sums per sequence, with bootstrap intervals over sequences."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -11,15 +11,15 @@ from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 
 TIMING = "timing"
-"""Condition under which `Parts` holds microseconds."""
+"""Name in place of a condition under which `Parts` holds times of updates [us]."""
 Parts: TypeAlias = dict[tuple[str, str, str], dict[str, Any]]
-"""Results of the cells by rig, condition and name."""
+"""Results of the cells by rig, condition and name of the estimator."""
 N_RESAMPLED = 1000
 _Sums: TypeAlias = Mapping[str, Floats]
 
 
 def compute_metrics(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
-    """Return all metrics of the benchmark by their dotted names."""
+    """Compute all metrics of the benchmark, by their dotted names."""
     metrics = _times(parts)
     for rig, condition, window in selection.rows():
         drawn = {
@@ -57,8 +57,8 @@ STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
 }
 """Metrics as functions of sums over sequences.
 
-The median is the mean of the sequences' medians; "facing wrong" is the share of frames in which
-left and right of the torso are exchanged.
+The median is the mean of the medians of sequences. "facing_wrong" is the share of frames in which
+left and right of the torso are swapped.
 """
 _NEEDS = {
     **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
@@ -67,9 +67,9 @@ _NEEDS = {
 
 
 def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
-    """Return sums over all sequences, and over 1000 draws with replacement: (1001, ...).
+    """Return sums (1001, ...) over all sequences, and over 1000 draws with replacement.
 
-    The draws depend on the number of sequences only, so those of two estimators are the same.
+    The draws depend on the number of sequences only, and are the same for all estimators.
     """
     arrays = {name: np.array(values, float) for name, values in sums.items()}
     n = len(arrays["n"])
@@ -82,7 +82,7 @@ def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
 
 
 def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
-    """Return the first value with the middle 95 % of the others."""
+    """Return the metric of the first value, with the central 95 % interval of the others."""
     low, high = np.percentile(values[1:], (2.5, 97.5))
     n = factor * round(float(sums["one"][0]))
     return Metric(float(values[0]), float(low), float(high), unit, n)
@@ -98,7 +98,7 @@ def _times(parts: Parts) -> dict[str, Metric]:
 
 
 def _bounds(parts: Parts, name: str, rigs: Sequence[str]) -> dict[str, Metric]:
-    """Return RMSE over its bound: the root mean square of the ratios over rigs, and each."""
+    """Compute the ratio of the RMSE to its bound on each rig, and the RMS of these ratios."""
     drawn = {rig: resample_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
     squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
     both = np.sqrt(np.mean(list(squared.values()), axis=0))

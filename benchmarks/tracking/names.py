@@ -1,4 +1,4 @@
-"""The participants of the tracking benchmark, and their rows."""
+"""Names of estimators and rows in the tracking benchmark, and their selection."""
 
 from dataclasses import dataclass
 
@@ -9,11 +9,11 @@ from hrc_env.core.errors import check_names
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
-"""Default estimator of an environment."""
+"""Name of the default estimator of an environment."""
 DLT = "dlt"
-"""Plain triangulation per frame; it knows which person a detection belongs to."""
+"""Name of plain triangulation of each frame, with known identities of detections."""
 SMOOTHER = "smoother"
-"""The smoother, which uses the whole clip; it is not compared with the filter's bound."""
+"""Name of the smoother, which uses the whole clip and is not compared with the bound of filters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,19 +21,19 @@ class Selection:
     """The part of the benchmark that is run."""
 
     estimators: tuple[str, ...] = ()
-    """Estimators besides the default; empty: all."""
+    """Names of estimators besides the default; all if empty."""
     sequences: tuple[str, ...] = ()
-    """Rigs and conditions: "lab", "hard" or "lab.hard"; empty: all."""
+    """Names of rigs and conditions, e.g. "lab", "hard" or "lab.hard"; all if empty."""
 
     def check(self) -> None:
-        """Raise `ConfigError` for unknown names, with the valid ones."""
+        """Raise `ConfigError` if a name is unknown, with the valid names."""
         check_names("estimator", self.estimators, [*ESTIMATORS, DLT, SMOOTHER])
         pairs = _all_conditions()
         known = [*RIGS, ENV, *dict.fromkeys(name for _, name in pairs), *map(".".join, pairs)]
         check_names("sequences", self.sequences, known)
 
     def conditions(self) -> list[tuple[str, str]]:
-        """Return (rig, condition) of everything that is run."""
+        """Return the selected pairs (rig, condition)."""
         return [
             (rig, condition)
             for rig, condition in _all_conditions()
@@ -42,18 +42,18 @@ class Selection:
         ]  # fmt: skip
 
     def rivals(self) -> list[str]:
-        """Return the other estimators that use only the frames up to now."""
+        """Return the selected causal estimators other than the default."""
         others = [*(name for name in ESTIMATORS if name != DEFAULT), DLT]
         return [name for name in others if not self.estimators or name in self.estimators]
 
     def names_of(self, condition: str) -> list[str]:
-        """Return the estimators that run on a condition, the default first."""
+        """Return the estimators that run on a condition, beginning with the default."""
         smooths = not self.estimators or SMOOTHER in self.estimators
         last = [SMOOTHER] if smooths and condition != MATCHED else []
         return [DEFAULT, *self.rivals(), *last]
 
     def timed(self) -> list[str]:
-        """Return the estimators that are timed."""
+        """Return the estimators for which updates are timed."""
         return [name for name in ESTIMATORS if name in (DEFAULT, *self.rivals())]
 
     def rows(self) -> list[tuple[str, str, str]]:
@@ -65,7 +65,7 @@ class Selection:
         ]
 
     def rigs_of(self, condition: str) -> list[str]:
-        """Return the simulated rigs on which a condition is run."""
+        """Return the simulated rigs for which a condition is selected."""
         return [rig for rig in RIGS if (rig, condition) in self.conditions()]
 
 
@@ -75,7 +75,7 @@ def _all_conditions() -> list[tuple[str, str]]:
 
 
 EVERYTHING = Selection()
-"""The whole benchmark."""
+"""Selection of the whole benchmark."""
 
 
 def rows() -> list[tuple[str, str, str]]:

@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.rotations import look_at
 from hrc_env.tracking.config import ParticleConfig
 
 DT_S = 0.04
-"""Time between two sets of frames [s]."""
+"""Time between frames [s]."""
 SIGMA_PX = 3.0
-"""Standard deviation of a detection, which the estimators know [px]."""
+"""Standard deviation of a detection [px], which is known to the estimators."""
 WIDTH_PX, HEIGHT_PX = 1920, 1080
 _CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 
@@ -24,7 +24,7 @@ class Rig:
 
     name: str
     P: Floats
-    """Projections (4, 3, 4)."""
+    """Projection matrices of the cameras (4, 3, 4)."""
     walk_m: tuple[float, float]
     """Half the length and width of the area in which people walk [m]."""
     tracker: ParticleConfig
@@ -32,13 +32,14 @@ class Rig:
 
 
 def make_rig(name: str) -> Rig:
-    """Return the rig with a name, "lab" or "site".
+    """Return the rig "lab" or "site".
 
-    lab: a room of 6.09 x 5.48 m, cameras 10 cm off its corners at 2.4 m with a field of view
-    of 118.2 x 69.5 degrees. site: 20 x 20 m, cameras over the corners at 5 m, 90 degrees.
+    "lab" is a room of 6.09 x 5.48 m; its cameras are 10 cm from the corners at a height of 2.4 m
+    and have a field of view of 118.2 x 69.5 degrees. "site" is an area of 20 x 20 m; its cameras
+    are above the corners at a height of 5 m and have a field of view of 90 degrees.
 
     Raises:
-        ConfigError: unknown name.
+        ConfigError: the name is unknown.
     """
     if name == "lab":
         focal_px = (
@@ -48,7 +49,7 @@ def make_rig(name: str) -> Rig:
         return _rig("lab", (2.945, 2.64, 2.4), 0.9, focal_px, (1.745, 1.44), 1.5)
     if name == "site":
         return _rig("site", (10.0, 10.0, 5.0), 1.0, (960.0, 960.0), (6.0, 6.0), 4.0)
-    raise unknown("rig", name, RIGS)
+    raise make_unknown_name_error("rig", name, RIGS)
 
 
 RIGS = ("lab", "site")

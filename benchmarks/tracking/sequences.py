@@ -1,4 +1,4 @@
-"""The sequences of the tracking benchmark: input and truth of all estimators."""
+"""The sequences of the tracking benchmark, with inputs of estimators and ground truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -22,11 +22,11 @@ from hrc_env.tracking.config import TrackerConfig
 
 MATCHED, TWO_WORKERS, LATE = "matched", "two_workers", "late"
 SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
-"""Conditions of the rigs lab and site; for `matched` the least mean squared error is known."""
+"""Conditions of the rigs lab and site; in `matched`, a bound on the mean squared error is known."""
 MATCHED_ROOT_ACCELERATION = 0.05
 """Acceleration of the root in matched sequences and in the estimators on them [m^2/s^3].
 
-It is small, so that bodies stay in view.
+It is small to keep the bodies in view.
 """
 MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "running": partial(run, speed_m_s=3.0),
@@ -42,7 +42,7 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
 }
-"""Motions of people other than walking, by condition."""
+"""Functions for motions other than walking, by condition."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
@@ -83,42 +83,42 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
-"""Frames that count, by condition.
+"""Windows of frames that are evaluated, by condition.
 
-They begin after the first second; while one camera sees, and one second after the others' return;
-half a second after a mirrored start; at the fall. Matched sequences are short, so that the drifting
-body stays in the images.
+Most begin after the first second. Others cover the time with one camera, begin one second after the
+other cameras return, half a second after a mirrored start, or at a fall. Matched sequences are
+short, to keep the drifting body in the images.
 """
 ENV_WINDOWS = {
     **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
     "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
 }
-"""Frames that count for the environment's own motion; its return counts after 0.4 s."""
+"""Windows of frames that are evaluated on the environment's rig, by condition."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sequences:
-    """S sequences of T frames with W people."""
+    """Sequences in a batch: S sequences of T frames with W people, from C cameras."""
 
     joints: Points3
     """True joints (T, S, W, J, 3) [m]."""
     px: Points2
-    """Pixels by person (T, S, C, W, J, 2)."""
+    """Detected pixels of each person (T, S, C, W, J, 2), NaN if they are missing."""
     windows: dict[str, tuple[int, int]]
-    """Frames of each window by name."""
+    """First frame and end of each window by name."""
     config: TrackerConfig
     confidence: Floats | None = None
-    """Confidence (T, S, C, W, J); None: 0.9 for each pixel."""
+    """Confidence (T, S, C, W, J); None for 0.9 for all detections."""
     sigma_px: Floats | None = None
-    """Standard deviation (T, S, C, W, J) [px]; None: `SIGMA_PX` for each pixel."""
+    """Standard deviation (T, S, C, W, J) [px]; None for `SIGMA_PX` for all detections."""
     order: Ints | None = None
-    """Order in which cameras report people, without labels (T, S, C, W); None: there is one
+    """Order in which cameras report people, without labels (T, S, C, W); None if there is one
     person."""
     time_s: Floats | None = None
-    """Time at which each delivered frame was taken (T, S, C) [s], as in `Keypoints`; None: all are
-    current."""
+    """Time at which each delivered frame was taken (T, S, C) [s], as in `Keypoints`; None if frames
+    are current."""
     bound_m2: Floats | None = None
-    """Least mean squared error (T, S, J) if it is known [m^2]."""
+    """Lower bound on the mean squared error (T, S, J) [m^2], or None if it is unknown."""
 
     @property
     def has_bones(self) -> bool:
@@ -135,7 +135,7 @@ class Sequences:
         return replace(self, **arrays)
 
     def keypoints(self, t: int) -> Keypoints:
-        """Return the keypoints that cameras report of frame t."""
+        """Return the keypoints that cameras report in frame t."""
         px = self.px[t]
         seen = np.isfinite(px[..., 0])
         if self.confidence is None or self.sigma_px is None:
@@ -152,9 +152,9 @@ class Sequences:
 
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
-    """Return sequences of a rig and a condition, one per seed.
+    """Create the sequences of a rig and a condition, one per seed.
 
-    Each depends on its own seed only.
+    Each sequence depends on its own seed only.
     """
     if rig.name == ENV:
         joints, seen = record(condition, seeds)
@@ -178,10 +178,10 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
 
 
 def _make_matched(rig: Rig, seeds: list[int]) -> Sequences:
-    """Return sequences from the estimators' own model, with estimators that know its parameters.
+    """Create sequences from the estimators' motion model, with matching settings of estimators.
 
-    These are the shared acceleration, no outliers, no exchanged sides, detections with the reported
-    noise, no bones, no floor, and bodies of any size.
+    The settings are the shared acceleration, no outliers, no swapped sides, detections with the
+    reported noise, no bones, no floor, and bodies of any size.
     """
     config = replace(
         rig.tracker,

@@ -1,8 +1,8 @@
-"""People walking and gesturing: the tracking benchmark's own motion, seeded, with rigid bones.
+"""Seeded motion of people who walk and gesture, with rigid bones.
 
-It is independent of the package's motion, with which estimators were tuned. A walker steers through
-the area at 0.9 to 1.5 m/s and turns back before its edge; legs swing with the stride; arms gesture
-in bursts of up to 3 m/s at the wrist.
+It is independent of the package's motion generator, with which estimators were tuned. A walker
+steers through the area at 0.9 to 1.5 m/s and turns back before its edge. The legs swing with the
+stride, and the arms gesture in bursts with wrist speeds of up to 3 m/s.
 """
 
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ from hrc_env.geometry.rotations import about_axis
 
 _SUBSTEPS = 8
 _SHORTEST = 500
-"""Number of frames over which noise is scaled to unit variance; shorter walks are cut from
-these."""
+"""Minimum number of frames over which noise is scaled to unit variance; shorter walks are cut from
+longer ones."""
 _NOISE_TAU_S = (1.5, 0.8, 1.2, 0.6, 0.6)
-"""Widths of the noise in speed, steering, leaning and the two arms' gestures [s]."""
+"""Time scales of noise in speed, steering, leaning and the gestures of both arms [s]."""
 _TURN_RATE, _TURN_TAU_S = 2.5, 0.25
 _UPPER_ARM_M, _FOREARM_M, _THIGH_M, _SHANK_M, _FOOT_M = 0.29, 0.26, 0.43, 0.42, 0.15
 _HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
@@ -30,17 +30,17 @@ class Gait:
     """Parameters of a gait."""
 
     speed_m_s: tuple[float, float, float]
-    """Least, usual and greatest speed [m/s]."""
+    """Minimum, mean and maximum speed [m/s]."""
     cycles_per_m: float = 0.72
-    """Cycles of both legs per metre."""
+    """Number of gait cycles per metre [1/m]."""
     thigh_rad: float = 0.45
     """Amplitude of the thighs' swing [rad]."""
     knee_rad: float = 0.55
-    """Further bend of the knee while its leg swings forward [rad]."""
+    """Additional flexion of the knee while its leg swings forward [rad]."""
     arm_rad: float = 0.4
     """Amplitude of the upper arms' swing [rad]."""
     elbow_rad: float = 0.3
-    """Bend of the elbows [rad]."""
+    """Flexion of the elbows [rad]."""
     bounce_m: float = 0.02
     """Amplitude of the hips' vertical motion [m]."""
 
@@ -50,31 +50,32 @@ WALKING = Gait((0.9, 1.25, 1.5))
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """A walk on the ground with the motion of the limbs; arrays (T, S), T in frames of 0.04 s."""
+    """Paths of S walkers and phases of their limbs, in T frames of 0.04 s; arrays (T, S)."""
 
     ground: Floats
     """Position on the ground (T, S, 2) [m]."""
     heading: Floats
     stride: Floats
-    """Phase of the stride [rad]."""
+    """Phase of the gait cycle [rad]."""
     lean: Floats
     gesture: Floats
-    """Gestures of the left and right arm (T, S, 2), in [0, 1]."""
+    """Intensity of gestures of the left and right arm (T, S, 2), in [0, 1]."""
     gait: Gait = WALKING
 
 
 def walk(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Points3:
-    """Return joints (T, S, J, 3) [m] of one walker per seed, on which alone it depends, at 25 Hz.
+    """Return joints (T, S, J, 3) [m] of one walker per seed, at 25 Hz.
 
-    The area around the origin has twice the size `walk_m` (length, width).
+    Each walker depends on its own seed only. The area around the origin has twice the size `walk_m`
+    (length, width).
     """
     return walk_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
 
 
 def walk_along(path: Path) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers along `path`."""
+    """Return joints (T, S, J, 3) [m] of walkers that follow a path."""
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
     joints[..., :2] += path.ground[:, :, None]
@@ -87,7 +88,7 @@ def walk_along(path: Path) -> Points3:
 def steer(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Path:
-    """Walk in substeps; return every frame."""
+    """Simulate the steering of one walker per seed in substeps; return the path in frames."""
     dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     starts = np.stack([rng.uniform(-0.5, 0.5, 3) for rng in rngs])
@@ -122,9 +123,9 @@ def steer(
 
 
 def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
-    """Return white noise (5, n) smoothed by Gaussian windows, of unit variance.
+    """Draw white noise (5, n), smoothed by Gaussian windows and scaled to unit variance.
 
-    The windows are `_NOISE_TAU_S` wide.
+    The widths of the windows are `_NOISE_TAU_S`.
     """
     width = np.array(_NOISE_TAU_S) / dt
     padded = n_steps + int(8 * width.max())
@@ -136,12 +137,12 @@ def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
 
 
 def _limb(angle: Floats, length_m: float) -> Points3:
-    """Return a limb that hangs down at angle 0 and swings forward."""
+    """Return the vector along a limb, which hangs down at angle 0 and swings forward."""
     return length_m * np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1)
 
 
 def _body(path: Path) -> Points3:
-    """Return joints (T, S, J, 3) relative to the middle of the hips: x forward, y left, z up."""
+    """Return joints (T, S, J, 3) relative to the midpoint of the hips: x forward, y left, z up."""
     body = np.zeros((*path.heading.shape, N_JOINTS, 3))
     lean, upright = np.sin(path.lean), np.cos(path.lean)
     level = np.zeros_like(lean)
@@ -163,7 +164,7 @@ def _body(path: Path) -> Points3:
 
 
 def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
-    """Return hip, knee, ankle and foot of one side."""
+    """Return positions of hip, knee, ankle and foot of one side."""
     thigh = gait.thigh_rad * np.sin(swing)
     shank = thigh - 0.15 - gait.knee_rad * np.clip(np.cos(swing), 0, 1) ** 2
     hip = np.broadcast_to(np.array([0.0, 0.11 * sign, 0.0]), (*swing.shape, 3))
@@ -175,7 +176,7 @@ def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
 def _arm(
     shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats, gait: Gait
 ) -> tuple[Points3, ...]:
-    """Return shoulder, elbow and wrist of one side.
+    """Return positions of shoulder, elbow and wrist of one side.
 
     A gesture raises, spreads and shakes the arm.
     """

@@ -1,6 +1,7 @@
-"""The environment's own workers that run and fall: a second source of the motions of `athletes`.
+"""Workers of the environment that run and fall, as a second source of such motions.
 
-Bodies are the eight baked ones, in turns; they share no code with the benchmark's walkers.
+Their bodies are the eight of the package, in turns. They share no code with the walkers of
+`athletes`.
 """
 
 import numpy as np
@@ -17,14 +18,11 @@ from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
 _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
-"""Speeds of running and walking [m/s], time of lying [s], and desired length of a walk [m]."""
+"""Speeds of running and walking [m/s], duration of lying [s], and desired length of a walk [m]."""
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner.
-
-    They run as fast as they can.
-    """
+    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner at top speed."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _plan_across(me)
@@ -45,7 +43,7 @@ def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int
 
 
 def _plan_across(me: Worker, most_m: float = np.inf) -> float:
-    """Plan a path past the middle, as long as the distance to it; return its direction [rad]."""
+    """Plan a straight path across the centre of the area; return its direction [rad]."""
     x, y = float(me.start_x), float(me.start_y)
     share = min(2.0, most_m / np.hypot(x, y))
     lay_path(Point(x, y), np.zeros((0, 3)), Point(x - share * x, y - share * y), me)

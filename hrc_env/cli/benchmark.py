@@ -1,4 +1,4 @@
-"""Score a policy by the benchmark: goals, contacts and cost on fixed seeds."""
+"""Score a policy with the benchmark: goals, contacts and cost on fixed seeds."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -16,33 +16,33 @@ from hrc_env.tasks import BUILT_IN
 class Benchmark(EngineArguments):
     """Score a policy on fixed seeds in the setups of the benchmark.
 
-    Workers are unaware, hurried or attentive; the robot perceives them with four cameras, with late
-    frames, with one camera, or knows the truth; each without and with a shield. The report has
-    goals a minute, contacts by kind, and cost. Finished parts stay in the folder, and a run that
-    was stopped continues there.
+    The setups differ in the workers (unaware, hurried or attentive), the perception (four cameras,
+    delayed frames, one camera or the true poses) and the shield (without or with one). The report
+    contains goals per minute, contacts by kind, and cost. Finished parts are kept in the folder,
+    and a run that was stopped continues there.
     """
 
     policy: str
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train`
-    or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that takes an EnvInfo and returns an object with act(observation)."""
+    """Agent: a name (random, scripted, scripted_slowed, hrc://ID/NAME); a file (a checkpoint of
+    `train` or Stable-Baselines3, .zip, or a policy of `export`, .safetensors); or MODULE:FUNCTION,
+    a function that takes an EnvInfo and returns an object with act(observation)."""
     trust: bool = False
-    """Load pickles in a checkpoint, which can run arbitrary code; see play."""
+    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see play)."""
     ids: tuple[str, ...] = tuple(BUILT_IN)
-    """Ids of the environments, registered ones (--import) included; a learnt policy fits one of
-    them."""
+    """Ids of the environments, including those registered by --import. A learnt policy fits only
+    one environment."""
     control: str | None = None
-    """Control of the policy's actions: joint (default), tool or twist; checkpoints contain
-    theirs."""
+    """Control mode of the policy's actions: joint (default), tool or twist. Checkpoints contain
+    their control mode."""
     out: Path | None = None
     """Folder for report.html and results.json (default: out/benchmark/POLICY)."""
     seeds: int = 64
     """Number of episodes per row."""
     enter: Path | None = None
-    """Write the numbers as an entry of the leaderboard, a JSON file of this name; in a clone,
+    """Also write an entry for the leaderboard to this JSON file; in a clone,
     docs/results/leaderboard/NAME.json."""
     overwrite: bool = False
-    """Delete earlier results in the folder that are of another run or other settings."""
+    """Delete results of another run or of other settings in the folder."""
 
     def run(self) -> int:
         """Run the benchmark and print its report; return the exit status."""

@@ -1,7 +1,7 @@
-"""Check whether this machine is ready; each line is ok or names the remedy.
+"""Check whether this machine is ready for the package, and name a remedy for each failure.
 
-Every failure must end up in its line: imports are inside of the checks, and code that can end the
-process (drivers, libraries that clash) runs in a process of its own.
+Every failure must be reported in the line of its check. Imports are therefore inside the checks,
+and code that can crash the process (drivers, libraries that clash) runs in a separate process.
 """
 
 import importlib.util
@@ -24,7 +24,7 @@ class Finding(NamedTuple):
 
     is_ok: bool
     message: str
-    """The version or state that was found, or the remedy."""
+    """Version or state that was found, or the remedy."""
 
 
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
@@ -34,16 +34,16 @@ NAMES = (
     "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
     "environment",
 )  # fmt: skip
-"""Names of the checks; each is the function `_check_NAME`."""
+"""Names of the checks, each of which is done by the function `_check_NAME`."""
 LITTLE_GB = 2.0
-"""Memory below which level `pixels` and films do not fit [GB]."""
+"""Memory that the level `pixels` and films need [GB]."""
 
 
 @dataclass(frozen=True)
 class Check:
     """Check versions, machine, OpenGL, kernels, weights and one step of an environment.
 
-    Each line is ok or names the remedy.
+    Each line of the output is either marked as ok or names the remedy.
     """
 
     def run(self) -> int:
@@ -114,7 +114,7 @@ def _check_triton() -> Finding:
 
 
 def _run_in_process(code: str) -> Finding:
-    """Run Python code in a process; return whether it succeeds, and the last line it prints."""
+    """Run Python code in a new process and return its success and its last line of output."""
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     if done.returncode < 0:

@@ -1,4 +1,4 @@
-"""Checks of a command's arguments that run before its work begins."""
+"""Checks of command-line arguments before a command begins its work."""
 
 import math
 import tempfile
@@ -24,7 +24,7 @@ def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> 
 
     Raises:
         ConfigError: the name has another ending.
-        HRCError: the place cannot be written.
+        HRCError: the file cannot be written.
     """
     if suffix and path.suffix.lower() != suffix:
         raise ConfigError(f"{option} must end in {suffix}, got {path.name!r}.")
@@ -33,7 +33,7 @@ def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> 
 
 
 def _explain_unwritable(folder: Path) -> str:
-    """Return why a folder, or its nearest parent that exists, cannot be written; "" if it can."""
+    """Return why a folder, or its nearest existing parent, is not writable, or "" if it is."""
     there = folder.absolute()
     while not there.exists() and there != there.parent:
         there = there.parent

@@ -1,4 +1,4 @@
-"""Options of commands that compute by an engine, and the choice of that engine."""
+"""Command-line options that choose the engine of a command."""
 
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -9,26 +9,25 @@ from hrc_env.engines.engine import Engine, engine_called
 
 @dataclass(frozen=True, kw_only=True)
 class EngineArguments:
-    """Options that choose where parts are computed; the numbers are the same everywhere."""
+    """Options of the engine that computes the parts of a run; it does not affect the results."""
 
     stays: ClassVar[str] = ""
-    """Why the command computes all of its work in its own process; "" for commands that take
-    engines."""
+    """Reason why the command supports no engine but serial; "" if it supports all."""
     engine: str | None = None
-    """Engine: serial, one part after the other; processes, as many at once as there are cores; ray,
-    as tasks of a cluster (docs/many_machines.md). Default: the fastest on this machine."""
+    """Engine: serial (one part after the other), processes (one part per core in parallel) or ray
+    (tasks of a cluster; docs/many_machines.md). Default: the fastest on this machine."""
     workers: int | None = None
-    """With processes and ray: number of parts computed at once (default: all cores)."""
+    """With processes and ray: number of parts computed in parallel (default: number of cores)."""
     address: str | None = None
-    """With ray: the cluster, as auto, HOST:6379 or ray://HOST:10001 (default: one on this
-    machine)."""
+    """With ray: address of the cluster, as auto, HOST:6379 or ray://HOST:10001 (default: a new
+    cluster on this machine)."""
 
     def choose_engine(self) -> Engine | None:
         """Return the engine of the options, or None if none is named.
 
         Raises:
-            ConfigError: the engine does not exist, it takes no workers or address, or the command
-                takes no engine.
+            ConfigError: the engine does not exist, does not accept workers or an address, or is not
+                supported by the command.
         """
         if self.stays and self.engine not in (None, "serial"):
             raise ConfigError(
@@ -37,6 +36,6 @@ class EngineArguments:
         return engine_called(self.engine, self.workers, self.address)
 
     def exclude_engine(self) -> dict[str, Any]:
-        """Return the arguments other than the engine's by name."""
+        """Return all arguments except those of the engine, by name."""
         names = {field.name for field in fields(self)} - {f.name for f in fields(EngineArguments)}
         return {name: getattr(self, name) for name in names}

@@ -1,4 +1,4 @@
-"""The call of a command: parse its arguments, and print errors without a traceback."""
+"""Parse and run a command, and print its errors without a traceback."""
 
 import os
 import sys
@@ -11,10 +11,10 @@ from hrc_env.registration import IMPORT, import_files
 
 
 def show_errors(run: Callable[[], int]) -> int:
-    """Run a function and return its exit status.
+    """Run a function, print an `HRCError` without a traceback, and return the exit status.
 
     Returns:
-        The function's own status; 2 after an `HRCError`, which is printed; 130 after Ctrl-C.
+        The status that the function returns; 2 after an `HRCError`; 130 after Ctrl-C.
     """
     try:
         return run()
@@ -32,9 +32,9 @@ def show_errors(run: Callable[[], int]) -> int:
 
 
 def import_first(words: Sequence[str], program: str) -> list[str]:
-    """Import the files of `--import FILE`; return the other words.
+    """Import the files that `--import FILE` names, and return the remaining arguments.
 
-    Files of the parent process are imported, too.
+    Files that the parent process imported are imported, too.
     """
     words = list(words)
     while "--import" in words:

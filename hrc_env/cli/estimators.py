@@ -1,12 +1,12 @@
-"""Estimators as arguments of a command: names, or functions as MODULE:FUNCTION."""
+"""Command-line arguments that choose estimators, by name or as MODULE:FUNCTION."""
 
 from collections.abc import Sequence
 
 
 def resolve_estimators(words: Sequence[str]) -> tuple[str, ...]:
-    """Return names of estimators; those given as MODULE:FUNCTION are registered first.
+    """Register the estimators given as MODULE:FUNCTION, and return the names of all.
 
-    Such an estimator gets the name of its function.
+    An estimator given as MODULE:FUNCTION gets the name of its function.
 
     Raises:
         ConfigError: the function or name does not exist, or the estimator is incomplete.

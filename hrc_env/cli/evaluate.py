@@ -1,4 +1,4 @@
-"""Score an agent over many episodes, on one machine or many."""
+"""Evaluate an agent over many episodes, on one machine or on a cluster."""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -22,24 +22,24 @@ from hrc_env.tasks import DEFAULT
 class Evaluate(EnvironmentArguments, EngineArguments):
     """Score an agent over whole episodes with fixed seeds: goals, contacts and cost.
 
-    Episodes are played on one machine or on a cluster. Seeds count up from --seed; the k-th episode
-    is the same for every agent and engine.
+    Episodes are played on one machine or on a cluster. The first episode has the seed --seed, and
+    each further episode the next one; the k-th episode is the same for every agent and engine.
     """
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Id of the environment."""
     agent: str = "scripted"
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train`
-    or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that takes an EnvInfo and returns an object with act(observation)."""
+    """Agent: a name (random, scripted, scripted_slowed, hrc://ID/NAME); a file (a checkpoint of
+    `train` or Stable-Baselines3, .zip, or a policy of `export`, .safetensors); or MODULE:FUNCTION,
+    a function that takes an EnvInfo and returns an object with act(observation)."""
     trust: bool = False
-    """Load pickles in a checkpoint, which can run arbitrary code; see play."""
+    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see play)."""
     episodes: int = 64
     """Number of episodes."""
     seed: int = 1_000_000
     """Seed of the first episode."""
     perception: str = "keypoints"
-    """Perception of the robot: keypoints (camera emulator), pixels, truth or none."""
+    """Perception level: keypoints (camera emulator), pixels, truth or none."""
     out: Path | None = None
     """Also write the score, agent, seed and environment to this JSON file."""
 

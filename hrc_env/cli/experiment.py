@@ -1,4 +1,4 @@
-"""Run an experiment: the paper's two, the effects of perception on safety, or ablations."""
+"""Run an experiment of the paper, a study of perception and safety, or the ablations."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -21,13 +21,13 @@ class AnyExperiment(EngineArguments):
 
     name: ClassVar[str]
     out: Path
-    """Folder for report.html, results.json and figures; a run that was stopped continues there."""
+    """Folder for report.html, results.json and figures. A run that was stopped continues there."""
     quick: bool = False
-    """Make every number from fewer seeds."""
+    """Compute the results from fewer seeds."""
     seeds: int | None = None
     """Number of seeds."""
     overwrite: bool = False
-    """Delete earlier results in the folder that are of another run or other settings."""
+    """Delete results of another run or of other settings in the folder."""
 
     def run(self) -> int:
         """Run the experiment and print its tables; return the exit status."""
@@ -45,19 +45,19 @@ class AnyExperiment(EngineArguments):
 
 @dataclass(frozen=True)
 class SiteExperiment(AnyExperiment):
-    """Run the paper's simulation: a walk over the site, single cameras against four."""
+    """Run the paper's simulation: a walk over the site, tracked by single cameras and by four."""
 
     name = "site"
     out: Path = Path("out/site")
     seeds: int | None = None
     """Number of walks (default: 9, quick: 2)."""
     estimator: tuple[str, ...] = ("particle", "paper")
-    """Estimators; python -m hrc_env list shows their names."""
+    """Estimators to compare; python -m hrc_env list shows their names."""
 
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
-    """Run the paper's laboratory: all joints, six kinds of motion, one camera against four."""
+    """Run the paper's laboratory: all joints in six kinds of motion, by one camera and by four."""
 
     name = "lab"
     out: Path = Path("out/lab")
@@ -70,61 +70,63 @@ class LabExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class ImpactExperiment(AnyExperiment):
-    """Measure the effect of perception on safety: same robots and workers, other detections."""
+    """Measure the effect of perception on safety: only the perception differs between rows."""
 
     name = "impact"
     out: Path = Path("out/impact")
     task: str = DEFAULT
-    """Task of the robots, by the environment's id."""
+    """Id of the environment."""
     shield: str | None = None
-    """Shield that may change their commands: qp, ssm, pfl, or a registered one (--import)."""
+    """Shield that may change the robots' commands: qp, ssm, pfl, or a registered one (--import)."""
     seeds: int | None = None
     """Number of episodes per row (default: 90, quick: 8)."""
     estimator: tuple[str, ...] = ()
-    """Estimators to compare with the default one, the truth and no perception (default: all
-    setups). Names, or MODULE:FUNCTION, a function of (P, ctrl_dt, config)."""
+    """Estimators to compare with the default one, the truth and no perception, by name or as
+    MODULE:FUNCTION, a function of (P, ctrl_dt, config). Default: all perception setups."""
     robots: tuple[str, ...] = ()
-    """Agents of the robots, instead of scripted, scripted_slowed and ppo, which is trained
-    first: any of these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as
+    """Agents that control the robots (default: scripted, scripted_slowed and ppo, which is trained
+    first): any of these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as
     in play."""
     control: str | None = None
-    """Control of policies without one in their files: joint (default), tool or twist."""
+    """Control mode of policies without one in their files: joint (default), tool or twist."""
     trust: bool = False
-    """Load pickles in their checkpoints, which can run arbitrary code; see play."""
+    """Allow pickles in the agents' checkpoints, which can run arbitrary code, to be loaded (see
+    play)."""
 
 
 @dataclass(frozen=True)
 class PriceExperiment(AnyExperiment):
-    """Measure the cost of perception at one rate of contacts.
+    """Measure the cost of perception at an equal rate of contacts.
 
-    Every perception setup gets the safety margin with which it reaches that rate.
+    Each perception setup gets the safety margin at which it reaches that rate.
     """
 
     name = "price"
     out: Path = Path("out/price")
     task: str = DEFAULT
-    """Task of the robots, by the environment's id."""
+    """Id of the environment."""
     seeds: int | None = None
-    """Number of episodes per search step (default: 300). Each margin found is then confirmed by 10
-    episodes for every 3 of these (default: 1000; quick: 600)."""
+    """Number of episodes per step of the search for a margin (default: 300). Each margin found is
+    confirmed by 10 episodes for every 3 of these (default: 1000; quick: 600)."""
     eyes: tuple[str, ...] = ()
-    """Perception setups to compare, by name, as truth particle one_camera (default: all; quick:
+    """Names of the perception setups to compare, as truth particle one_camera (default: all; quick:
     12)."""
     robots: tuple[str, ...] = ()
-    """Agent of the robots, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a
+    """Agent that controls the robots (default: scripted): random, scripted_slowed, hrc://ID/NAME, a
     file (.zip, .safetensors) or MODULE:FUNCTION, as in play. Other tasks are then left out."""
     control: str | None = None
-    """Control of the agent if its file does not name one: joint (default), tool or twist."""
+    """Control mode of the agent if its file does not name one: joint (default), tool or twist."""
     trust: bool = False
-    """Load pickles in its checkpoint, which can run arbitrary code; see play."""
+    """Allow pickles in the agent's checkpoint, which can run arbitrary code, to be loaded (see
+    play)."""
 
 
 @dataclass(frozen=True)
 class AblationsExperiment(AnyExperiment):
     """Study the settings that the paper leaves open.
 
-    These are the number and places of cameras, N and M of Algorithm 1, latency, calibration,
-    occlusion, several workers, and the parts of the default filter.
+    These are the number and positions of the cameras, N and M of Algorithm 1, latency, calibration,
+    occlusion, the number of workers, and the parts of the default filter.
     """
 
     name = "ablations"
@@ -141,10 +143,10 @@ class Experiment:
     """Run an experiment of the paper or of this package.
 
     The paper's two experiments are site and lab; impact measures the effect of perception on
-    safety, price the cost of perception at one rate of contacts, and ablations compares rigs and
-    estimators. Each takes --quick (minutes) and --out DIR, where it writes report.html,
-    results.json and figures. Finished parts are kept when it is stopped, and the same command
-    continues there.
+    safety, price the cost of perception at an equal rate of contacts, and ablations compares rigs
+    and estimators. Each accepts --quick, which takes minutes, and --out DIR, the folder for
+    report.html, results.json and figures. If a run is stopped, its finished parts are kept, and the
+    same command continues it.
     """
 
     experiment: (

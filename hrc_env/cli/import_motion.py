@@ -22,50 +22,51 @@ if TYPE_CHECKING:  # --help imports no simulator
     from hrc_env.motion.clip import Clip
 
 USUAL_FPS = 60.0
-"""Frame rate to which faster recordings are resampled [1/s]: a step keeps 30 frames."""
+"""Frame rate to which faster recordings are resampled [1/s]; a step then has about 30 frames."""
 TILE = (300, 400)
 N_MOMENTS, COLUMNS = 12, 6
 STAGE_M = (0.9, 0.3)
-"""Position of the worker's middle in every picture [m]: a strip shows poses, not paths."""
+"""Horizontal position to which the worker is moved in every picture of the film strip [m]."""
 EYE_M = (1.4, -1.7, 1.35)
-"""Position of the camera relative to the worker's middle, its height above the floor [m]."""
+"""Position of the camera: x and y relative to the worker, z above the floor [m]."""
 TARGET_Z_M = 0.95
-"""Height that the camera looks at [m]."""
+"""Height of the point at which the camera is aimed [m]."""
 HFOV_DEG = 44.0
 """Horizontal field of view of the camera [deg]."""
 
 
 @dataclass(frozen=True)
 class ImportMotion:
-    """Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.
+    """Convert a motion-capture recording (BVH, ASF/AMC or npz) into a clip that workers play.
 
-    Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are detected,
-    repaired and reported; a recording that cannot be repaired is refused with the reason. The
-    joints are fitted by a worker's body, standing feet are locked, and the error of each joint is
-    printed. docs/motion_capture.md lists the joint names that are recognized.
+    Units, the upward axis, a T-pose in the first frame, short gaps and swapped axes are detected,
+    corrected and reported; a recording that cannot be repaired is rejected with the reason. A
+    worker's body is fitted to the joints, standing feet are fixed to the floor, and the error of
+    each joint is printed. docs/motion_capture.md lists the joint names that are recognized.
     """
 
     file: tyro.conf.Positional[Path]
-    """The recording: .bvh, .amc (its .asf beside it), or .npz with joints (T, 15, 3) and fps."""
+    """Recording: .bvh, .amc (with its .asf in the same folder), or .npz with joints (T, 15, 3) and
+    fps."""
     out: Path
-    """The clip to write, .npz; an interrupted run leaves no partial file."""
+    """Clip to write (.npz); an interrupted run leaves no partial file."""
     fps: float | None = None
-    """Frames a second of the clip (default: the recording's own, at most 60)."""
+    """Frame rate of the clip [1/s] (default: that of the recording, at most 60)."""
     source_fps: float | None = None
-    """The recording's true frame rate, if its file has none (AMC) or a wrong one."""
+    """True frame rate of the recording [1/s], if its file contains none (AMC) or a wrong one."""
     skeleton: Path | None = None
-    """The .asf file of an .amc file, if it is not beside it."""
+    """The .asf file of an .amc file, if it is not in the same folder."""
     joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Name of a joint in the file, if it is not recognized: left_shoulder=lShldr, or a TOML file of
-    such lines. The option may be repeated."""
+    """Joint with an unknown name in the file, as left_shoulder=lShldr, or a TOML file with such
+    lines. The option may be repeated."""
     up: str | None = None
-    """The upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
+    """Upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False
-    """Accept feet that are not on one level floor: on stairs or terrain, long in the air, or
-    above the floor because the right .asf file is missing. The clip is played as if the floor
-    were level."""
+    """Accept recordings with feet that are not on one level floor: on stairs or terrain, in the air
+    for long, or above the floor because the right .asf file is missing. The clip is played as if
+    the floor were level."""
     worker: str = "worker_1"
-    """Body to fit; others can play the clip, too, scaled to their legs and arms."""
+    """Name of the body to fit. Others can play the clip, too, scaled to their legs and arms."""
     picture: Path | None = None
     """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
 
@@ -114,7 +115,7 @@ class ImportMotion:
 
 
 def print_capture(console: Console, capture: "Capture") -> None:
-    """Print the length and rate of a recording, and each repair."""
+    """Print the length and frame rate of a recording, and the repairs that were made."""
     n_frames = len(capture.joints_world)
     text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
     console.print(text + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
@@ -123,7 +124,7 @@ def print_capture(console: Console, capture: "Capture") -> None:
 
 
 def print_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
-    """Print the recognized joints with the distance between worker and person at each."""
+    """Print each joint's name in the file and its distance between worker and recorded person."""
     table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
     joints = zip(JOINTS, capture.node_names, 100 * error.mean_m, 100 * error.p95_m, strict=True)
     for joint, name, mean_cm, p95_cm in joints:
@@ -143,7 +144,7 @@ def print_error(console: Console, capture: "Capture", clip: "Clip", error: "Reta
 
 
 def _draw_film_strip(clip: "Clip", worker: str) -> "Image":
-    """Return poses of a clip at equal intervals as one picture, each with its time."""
+    """Return one picture of a clip's poses at equal intervals, each labelled with its time."""
     import numpy as np  # here: --help imports no simulator
 
     from hrc_env.core.records import WorkerMotion

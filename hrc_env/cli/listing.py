@@ -1,4 +1,4 @@
-"""List the names that arguments take, or print the configuration that arguments make."""
+"""List the names that arguments take, or print the configuration that arguments describe."""
 
 from dataclasses import asdict, dataclass
 
@@ -13,11 +13,11 @@ from hrc_env.env_words import EnvironmentArguments
 class List(EnvironmentArguments):
     """List the names that arguments take: tasks, perception levels, robots, agents and others.
 
-    With --config: print every setting of the environment that the arguments describe, as TOML.
+    With --config, print every setting of the environment that the arguments describe, as TOML.
     """
 
     config: tuple[str, ...] | None = None  # type: ignore[assignment]
-    """Print the configuration, with these changes if any are given: FIELD=VALUE or a .toml file."""
+    """Print the configuration with these changes, if any: FIELD=VALUE or a .toml file."""
 
     def run(self) -> int:
         """Print the table or the configuration; return the exit status."""
@@ -49,8 +49,8 @@ class List(EnvironmentArguments):
         return 0
 
     def _show_config(self) -> int:
-        from hrc_env.core.mapping import plain, to_toml
-        from hrc_env.settings import settle
+        from hrc_env.core.mapping import convert_to_plain, to_toml
+        from hrc_env.settings import resolve_settings
 
-        print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
+        print(to_toml(convert_to_plain(asdict(resolve_settings(**self.keywords()).config))), end="")
         return 0

@@ -1,4 +1,4 @@
-"""The options of a command: unknown ones are refused with the nearest, switches take both forms."""
+"""Normalization of a command's options, and suggestions for unknown ones."""
 
 import difflib
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import tyro
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 BOOLEANS = {"true": True, "false": False}
 ALWAYS = ("help",)
@@ -17,17 +17,17 @@ ALWAYS = ("help",)
 def normalize_words(command: type[Any], words: Sequence[str], program: str) -> list[str]:
     """Return a command's arguments in the form that its parser takes.
 
-    Switches may come with a value: `--film False` is `--no-film`, `--film True` is `--film`. Of
-    optional switches, `--no-her` is `--her False`.
+    Switches may have a value: `--film False` becomes `--no-film`, and `--film True` becomes
+    `--film`. For switches that can also be None, `--no-her` becomes `--her False`.
 
     Args:
-        command: the record that the arguments fill.
+        command: the dataclass that the arguments fill.
         words: the arguments of the command line.
-        program: the command as it is called.
+        program: the command as it is called, for error messages.
 
     Raises:
-        ConfigError: an option does not exist, and the nearest one is named; or a switch has another
-            value.
+        ConfigError: an option does not exist (the message suggests the nearest one), or a switch
+            has a value other than True and False.
     """
     given, result = [*words], list[str]()
     while given and given[0] == "--":
@@ -35,7 +35,7 @@ def normalize_words(command: type[Any], words: Sequence[str], program: str) -> l
     while (kinds := _find_subcommands(command)) and given and not given[0].startswith("-"):
         result.append(given.pop(0))
         if result[-1] not in kinds:
-            raise unknown("command", result[-1], kinds)
+            raise make_unknown_name_error("command", result[-1], kinds)
         command, program = kinds[result[-1]], f"{program} {result[-1]}"
     options = _find_options(command)
     switches = {name for name, kind in options.items() if kind is bool}
@@ -80,7 +80,7 @@ def _make_unknown_error(option: str, options: dict[str, Any], program: str) -> C
 
 
 def _find_options(command: type[Any]) -> dict[str, Any]:
-    """Return the types of a record's fields by the names of their options."""
+    """Return the types of a command's options by name."""
     hints = get_type_hints(command, include_extras=True)
     named = {each.name: hints[each.name] for each in fields(command) if each.init}
     return {
@@ -91,7 +91,7 @@ def _find_options(command: type[Any]) -> dict[str, Any]:
 
 
 def _find_subcommands(command: type[Any]) -> dict[str, type[Any]]:
-    """Return the records of a command's subcommands by name; most commands have none."""
+    """Return the dataclasses of a command's subcommands by name, or {} if it has none."""
     for kind in get_type_hints(command, include_extras=True).values():
         if get_origin(kind) is Annotated:
             continue
@@ -102,7 +102,7 @@ def _find_subcommands(command: type[Any]) -> dict[str, type[Any]]:
 
 
 def _read_name(kind: Any) -> str:
-    """Return the name that `tyro.conf.subcommand` gave to a record."""
+    """Return the name that `tyro.conf.subcommand` gave to a subcommand."""
     named = (getattr(each, "name", None) for each in getattr(kind, "__metadata__", ()))
     return next(name for name in named if name)
 

@@ -30,19 +30,19 @@ class Play(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Id of the environment."""
     agent: str = "scripted_slowed"
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of
-    a checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export`
-    (.safetensors); or MODULE:FUNCTION, a function that takes an EnvInfo and returns an object with
-    act(observation). Files of this package contain their --control."""
+    """Agent: a name (random, scripted, scripted_slowed, hrc://ID/NAME; see python -m hrc_env list);
+    a file (a checkpoint of `train` or Stable-Baselines3, .zip, or a policy of `export`,
+    .safetensors); or MODULE:FUNCTION, a function that takes an EnvInfo and returns an object with
+    act(observation). Files written by this package contain their --control."""
     trust: bool = False
-    """Load pickles in a checkpoint of Stable-Baselines3, which can run arbitrary code: needed for
-    its author's own policy or network classes, and for statistics of VecNormalize."""
+    """Allow pickles in a checkpoint of Stable-Baselines3, which can run arbitrary code, to be
+    loaded: needed for custom policy or network classes, and for statistics of VecNormalize."""
     episodes: int = 1
     """Number of episodes to play."""
     seed: int = 0
-    """Seed of the first episode; later ones count up."""
+    """Seed of the first episode; it increases by one with each further episode."""
     video: Path | None = None
-    """Write a film of the first episode to this .mp4 file, and play no other."""
+    """Film the first episode, write it to this .mp4 file, and play no further episodes."""
     viewer: bool = False
     """Show the scene in MuJoCo's interactive viewer (needs a display)."""
 
@@ -93,23 +93,23 @@ class Play(EnvironmentArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(EnvironmentArguments):
-    """Film a scripted robot that slows down near a person, whom it detects in rendered images."""
+    """Film a scripted robot that detects a person in rendered images and slows down nearby."""
 
     out: Path = Path("out/demo.mp4")
-    """The film to write; a still PNG is written beside it."""
+    """Film to write (.mp4); a still image (.png) is written to the same folder."""
     seed: int = 7
     """Seed of the episode."""
     seconds: float = 10.0
-    """Length of the film [s]."""
+    """Duration of the film [s]."""
 
     def run(self) -> int:
         """Write the film and print its scores; return the exit status."""
         check_at_least("--seed", self.seed, 0)
         check_writable_file(self.out, ".mp4")
         Console().print("Loading the simulator ...")
-        from hrc_env.settings import settle  # here: --help imports no simulator
+        from hrc_env.settings import resolve_settings  # here: --help imports no simulator
 
-        ctrl_dt = settle(**self.keywords()).config.ctrl_dt
+        ctrl_dt = resolve_settings(**self.keywords()).config.ctrl_dt
         check_at_least("--seconds", self.seconds, ctrl_dt)
         make_ready(Console(), self.perception, draws=True, installs=True)
         title = "the worker is known through four cameras only"
@@ -132,8 +132,8 @@ def film_agent(
         arguments: the command, with the environment and the seed.
         agent: name of the agent.
         path: the .mp4 file to write.
-        n_steps: length of the film in control steps (default: the whole episode).
-        title: title of the table that is printed.
+        n_steps: duration of the film in control steps (default: the whole episode).
+        title: title of the printed table.
         trust: whether pickles in a checkpoint may be loaded.
     """
     from hrc_env.evaluation import film
@@ -144,7 +144,7 @@ def film_agent(
 
 
 def make_agent_factory(agent: str, seed: int, trust: bool) -> "Callable[[EnvInfo], Agent]":
-    """Return a function that makes the agent of this name for an `EnvInfo`."""
+    """Return a function that makes the named agent for an `EnvInfo`."""
     from hrc_env.agents.registry import make_agent
 
     return lambda env_info: make_agent(agent, env_info, seed, trust)

@@ -14,12 +14,12 @@ from hrc_env.tasks import DEFAULT
 
 @dataclass(frozen=True, kw_only=True)
 class Record(RecordingRequest):
-    """Record an agent's episodes as a data set of Minari or a folder.
+    """Record an agent's episodes as a Minari data set or in a folder.
 
-    Finished episodes are kept when the command is stopped or killed, and the same command continues
-    there. The data set appears when it is complete: with --out among Minari's
-    (MINARI_DATASETS_PATH), with --folder in that folder, and hrc_env.load_episodes(FOLDER) reads
-    it.
+    If the command is stopped or killed, finished episodes are kept, and the same command continues
+    the recording. The data set appears when it is complete: with --out, in the folder of Minari's
+    data sets (MINARI_DATASETS_PATH); with --folder, in that folder, from which
+    hrc_env.load_episodes(FOLDER) reads it.
     """
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
@@ -29,7 +29,8 @@ class Record(RecordingRequest):
         """Record the episodes; return the exit status.
 
         Raises:
-            ConfigError: the data set exists already, its name is not valid, or options contradict.
+            ConfigError: the data set exists already, its name is invalid, or options contradict
+                each other.
         """
         check_names("environment", [self.task], hrc_env.IDS)
         check_at_least("--episodes", self.episodes, 1)

@@ -16,11 +16,11 @@ class Setup:
     """
 
     networks: tuple[Literal["lite", "heavy"], ...] = ()
-    """Other landmark networks to fetch, too (41 MB), for detector.folded_network and
+    """Additional landmark networks to fetch (41 MB), for detector.folded_network and
     detector.network."""
 
     def run(self) -> int:
-        """Set up; return 0, even without OpenGL, which only pictures need."""
+        """Carry out the setup and return 0, even without OpenGL, which only pictures need."""
         console = Console()
         fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
         ready, message = find_opengl(console)

@@ -12,7 +12,7 @@ from hrc_env.core.progress import Say, progress_bar
 
 
 def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
-    """Run a benchmark or an experiment under a progress bar, then print its report.md."""
+    """Run a benchmark or an experiment with a progress bar, and print its report.md."""
     check_writable_folder(out)
     console = Console()
     with progress_bar(console, name) as say:
@@ -25,8 +25,8 @@ def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
 def print_report(console: Console, text: str) -> None:
     """Print a report in Markdown.
 
-    It is rendered if its tables fit in the terminal. Otherwise it is printed as it is, with the
-    columns of its tables aligned, so that no number is cut.
+    The report is rendered if its tables fit in the terminal. Otherwise its source is printed with
+    aligned table columns, so that no number is cut off.
     """
     text = align_tables(text)
     widest = max((len(line) for line in text.splitlines() if line.startswith("|")), default=0)
@@ -37,7 +37,7 @@ def print_report(console: Console, text: str) -> None:
 
 
 def align_tables(text: str) -> str:
-    """Return Markdown with all cells of a table column padded to one width."""
+    """Return Markdown in which all cells of a table column are padded to the same width."""
     blocks = groupby(text.splitlines(), key=lambda line: line.startswith("|"))
     return "\n".join(
         line for is_table, lines in blocks for line in (_align([*lines]) if is_table else lines)

@@ -1,4 +1,4 @@
-"""Train a policy, evaluate it, draw its curve and film it; `agents/training.py` does the work."""
+"""Train a policy, evaluate it, plot its curve and film it; `agents/training.py` does the work."""
 
 import math
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ ENGINES = ("sb3", "ray")
 
 @dataclass(frozen=True, kw_only=True)
 class Train(TrainingRequest):
-    """Train a policy, evaluate it on fixed seeds, draw its curve, film it.
+    """Train a policy, evaluate it on fixed seeds, plot its learning curve and film it.
 
-    Ctrl-C saves the policy and prints the command that continues. Files in a folder are never
-    overwritten: a second run into runs/quick goes to runs/quick-2. Curves: tensorboard --logdir
-    runs.
+    Ctrl-C saves the policy and prints the command that continues the training. Existing files are
+    never overwritten: a second run with --out runs/quick writes to runs/quick-2. To see learning
+    curves, type tensorboard --logdir runs.
     """
 
     def run(self) -> int:
         """Train the policy; return the exit status.
 
         Raises:
-            ConfigError: a number or a name with which no policy can be trained.
+            ConfigError: an option has an invalid value, or options contradict each other.
         """
         from hrc_env.agents.recipes import fill_in  # here: --help imports no simulator
 
@@ -50,7 +50,7 @@ class Train(TrainingRequest):
         return training.run(self)
 
     def _check_engine(self, algorithm: str) -> None:
-        """Raise `ConfigError` for options that the engine does not take."""
+        """Raise `ConfigError` for options that the engine does not support."""
         check_names("engine", [self.engine], ENGINES)
         if self.engine == "ray":
             if algorithm != "ppo":

@@ -1,1 +1,1 @@
-"""Words that all rooms share: types, errors, records, random streams, compiled kernels."""
+"""Types, errors, records, random streams and compiled kernels that all subpackages share."""

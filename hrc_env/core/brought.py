@@ -1,4 +1,4 @@
-"""Checks of functions and values that users supply: arguments, kinds, shapes and ranges."""
+"""Checks of functions and values that users supply: arguments, types, shapes and ranges."""
 
 import inspect
 import os
@@ -14,15 +14,15 @@ from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.typing import is_array, is_list_or_tuple, is_numpy_scalar
 
 LONGEST = 80
-"""Number of characters of a value that an error shows."""
+"""Maximum number of characters of a value in an error message."""
 
 
-def described(value: object) -> str:
-    """Describe a value in a few words, for errors."""
+def describe(value: object) -> str:
+    """Return a short description of a value, for error messages."""
     if is_array(value):
         return f"an array of {value.dtype} with shape {value.shape}"
     if is_list_or_tuple(value):
-        parts = ", ".join(described(each) for each in value[:4])
+        parts = ", ".join(describe(each) for each in value[:4])
         more = ", ..." if len(value) > 4 else ""
         return f"a {type(value).__name__} of {len(value)} ({parts}{more})"
     text = repr(value)
@@ -34,13 +34,13 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
     """Raise `ConfigError` unless a function can be called with these positional arguments.
 
     Args:
-        what: the function's role, as errors name it.
-        function: the function of a user.
+        what: role of the function, for error messages.
+        function: the user's function.
         names: names of the arguments.
     """
     try:
         signature = inspect.signature(function)
-    except (ValueError, TypeError) as error:  # of what is written in C there is none
+    except (ValueError, TypeError) as error:  # functions in C have no signature
         if isinstance(function, type):
             raise ConfigError(
                 f"{what} must be a function of ({', '.join(names)}), got the class "
@@ -56,12 +56,14 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
 
 
 def function_called(what: str, name: str, meaning: str) -> Any:
-    """Return the function that "MODULE:FUNCTION" names; the working folder is searched, too.
+    """Import and return the function named by "MODULE:FUNCTION".
+
+    Modules in the working directory are found, too.
 
     Args:
-        what: role of the function, such as "agent", for errors.
+        what: role of the function, such as "agent", for error messages.
         name: dotted name of the module and, after a colon, name of the function.
-        meaning: requirement on the function, for errors.
+        meaning: requirement on the function, for error messages.
 
     Raises:
         ConfigError: there is no such function.
@@ -85,10 +87,10 @@ def numbers_of(
     """Return a value as a new array of float64, contiguous.
 
     Args:
-        what: name of the value with its unit, for errors.
-        value: an array, or anything that NumPy turns into one.
+        what: name of the value with its unit, for error messages.
+        value: an array, or any value that NumPy converts to one.
         shape: the expected shape.
-        meaning: meaning of the axes, for errors.
+        meaning: meaning of the axes, for error messages.
         finite: whether NaN and infinite numbers are refused.
 
     Raises:
@@ -98,10 +100,10 @@ def numbers_of(
     try:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:  # lists of unlike lengths, broken __array__
-        raise ConfigError(f"{what} must be an array, got {described(value)}: {error}") from error
+        raise ConfigError(f"{what} must be an array, got {describe(value)}: {error}") from error
     if array.dtype.kind not in "fiub":
         raise ConfigError(
-            f"{what} must be real numbers of shape {shape} ({meaning}), got {described(value)}."
+            f"{what} must be real numbers of shape {shape} ({meaning}), got {describe(value)}."
         )
     check_shape(what, array.shape, shape, meaning)
     numbers = np.array(array, np.float64, order="C")
@@ -117,13 +119,13 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
     """Return a value as an array of booleans.
 
     Args:
-        what: name of the value, for errors.
-        value: an array, or anything that NumPy turns into one.
+        what: name of the value, for error messages.
+        value: an array, or any value that NumPy converts to one.
         shape: the expected shape.
-        meaning: meaning of the axes, for errors.
+        meaning: meaning of the axes, for error messages.
 
     Raises:
-        ConfigError: the value has another shape, or numbers other than 0 and 1.
+        ConfigError: the value has another shape, or contains numbers other than 0 and 1.
     """
     numbers = numbers_of(what, value, shape, meaning)
     if not np.isin(numbers, (0.0, 1.0)).all():
@@ -132,12 +134,12 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
 
 
 def points_of(what: str, value: object) -> NDArray[np.float64]:
-    """Return a value as points (N, 3), at least one, or raise `ConfigError`."""
+    """Return a value as at least one point, (N, 3), or raise `ConfigError`."""
     return numbers_of(what, value, (count_of(value), 3), "points, xyz")
 
 
 def count_of(value: object) -> int:
-    """Return the length of a list or array, at least 1; of anything else 1."""
+    """Return the length of a list or array, but at least 1; return 1 for any other value."""
     if is_list_or_tuple(value) or (is_array(value) and value.ndim > 0):
         return max(len(value), 1)
     return 1
@@ -150,24 +152,22 @@ def positive(what: str, value: object, unit: str) -> float:
         plain = np.nan
     number = float(plain)
     if not 0 < number < np.inf:
-        raise ConfigError(f"{what} must be positive and finite [{unit}], got {described(value)}.")
+        raise ConfigError(f"{what} must be positive and finite [{unit}], got {describe(value)}.")
     return number
 
 
 def check_kind(what: str, value: object, *kinds: type | None) -> None:
-    """Raise `ConfigError` for a value that is of none of these kinds; None stands for None."""
+    """Raise `ConfigError` unless a value has one of these types; the type None permits None."""
     if not any(value is None if kind is None else isinstance(value, kind) for kind in kinds):
         names = " or ".join("None" if kind is None else kind.__name__ for kind in kinds)
         article = "an" if names[0] in "AEIOaeio" else "a"
-        raise ConfigError(f"{what} must be {article} {names}, got {described(value)}.")
+        raise ConfigError(f"{what} must be {article} {names}, got {describe(value)}.")
 
 
 def check_kinds(what: str, values: object, *kinds: type) -> None:
-    """Raise `ConfigError` unless there is a sequence of at least one value of these kinds."""
+    """Raise `ConfigError` unless `values` is a list of at least one value of these types."""
     if not is_list_or_tuple(values) or not values:
         names = " or ".join(kind.__name__ for kind in kinds)
-        raise ConfigError(
-            f"{what} must be a list of at least one {names}, got {described(values)}."
-        )
+        raise ConfigError(f"{what} must be a list of at least one {names}, got {describe(values)}.")
     for k, value in enumerate(values):
         check_kind(f"{what}[{k}]", value, *kinds)

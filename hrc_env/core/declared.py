@@ -1,4 +1,4 @@
-"""Declared records: one class gives NumPy's dtype, the type checker's type and the documentation.
+"""Declared records: one class defines NumPy's dtype, the type for checkers, and the documentation.
 
     class Track:
         mean: Annotated[Floats, (15, 6)]    # each field with a docstring below it
@@ -9,11 +9,11 @@
     tracks = make_records(Track, (n_envs, n_workers))  # dtype TRACK, of type Records2[Track]
 
 A kernel whose argument is annotated `tracks: Records2[Track]` reads and writes
-`tracks[e, w].age_s[j]`; a misspelt field is an error of the type checker before anything runs.
-Such a class is never instantiated: its rows live in arrays. Python code reads their fields by name
-(`tracks["age_s"]`); attributes of rows exist in kernels only. Bundles of arrays whose sizes differ
-from call to call (with the robot, the batch) are `typing.NamedTuple` classes, which kernels take
-as they are.
+`tracks[e, w].age_s[j]`; the type checker reports a misspelt field before anything runs. Such a
+class is never instantiated: its rows are stored in arrays. Python code reads their fields by name
+(`tracks["age_s"]`); attributes of rows exist in kernels only. Groups of arrays whose sizes vary
+between calls (with the robot or the batch) are `typing.NamedTuple` classes, which kernels accept
+directly.
 """
 
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ NewT = TypeVar("NewT")
 Selection: TypeAlias = slice | NDArray[Any] | list[int] | EllipsisType
 """An index that selects rows and keeps their axis."""
 SCALARS: dict[Any, str] = {bool: "?", int: "i8", float: "f8"}
-"""NumPy's type of a field that is a single value."""
+"""NumPy type codes of the fields that hold a single value."""
 
 
 @cache
@@ -60,7 +60,7 @@ def dtype_of(declaration: type) -> np.dtype[Any]:
 
 
 def _field_type(name: str, hint: Any) -> tuple[Any, ...]:
-    """Return (type,) or (type, shape) of a field, as NumPy takes them."""
+    """Return the NumPy type of a field, as (type,) or (type, shape)."""
     shapes: list[tuple[int, ...]] = []
     if get_origin(hint) is Annotated:
         hint, *metadata = get_args(hint)
@@ -95,13 +95,13 @@ def make_records(declaration: type[Any], shape: Any) -> Any:
 
     Args:
         declaration: the class that declares a row.
-        shape: length of every axis, one to five.
+        shape: lengths of the axes, of which there are one to five.
     """
     return np.zeros(shape, dtype_of(declaration))
 
 
 class AnyRecords(Protocol):
-    """A structured array as the type checker sees it; at run time it is NumPy's."""
+    """Interface of a structured array for the type checker; at run time it is a NumPy array."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -115,7 +115,7 @@ class AnyRecords(Protocol):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """The structured dtype of a row."""
+        """Structured dtype of a row."""
         ...
 
     def __len__(self) -> int: ...

@@ -9,16 +9,16 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 _WIDTH = 88
-"""Length of the lines of a list of attributes [characters]."""
+"""Line width of a list of attributes [characters]."""
 
 
 class Attribute(NamedTuple):
     """An annotated attribute in the body of a class, with the docstring below it."""
 
     node: ast.AnnAssign
-    """Syntax of the attribute."""
+    """Syntax tree of the attribute."""
     doc: str
-    """Docstring."""
+    """Docstring of the attribute."""
 
     @property
     def name(self) -> str:
@@ -27,7 +27,7 @@ class Attribute(NamedTuple):
 
     @property
     def annotation(self) -> str:
-        """Type as the source states it, without the quotes of one that is not evaluated."""
+        """Type annotation as in the source, without the quotes of a forward reference."""
         node = self.node.annotation
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             return node.value
@@ -49,7 +49,7 @@ def attribute_docs(kind: type) -> dict[str, str]:
 
 
 def field_docs(kind: type) -> dict[str, str]:
-    """Return the docstring of each field of a dataclass, inherited ones included."""
+    """Return the docstring of each field of a dataclass, including inherited fields."""
     docs: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         if dataclasses.is_dataclass(each):
@@ -63,16 +63,18 @@ def list_attributes(kind: type) -> list[Attribute]:
     for base in reversed(kind.__mro__):
         if base.__module__.partition(".")[0] == "hrc_env":
             found |= {each.name: each for each in read_attributes(base)}
-    return [each for name, each in found.items() if not name.startswith("_")]
+    hidden = {"RENAMED"}  # former names of fields, for errors
+    return [each for name, each in found.items() if not name.startswith("_") and name not in hidden]
 
 
 class DocWithAttributes:
-    """A descriptor for `__doc__`: the docstring of a class, and a list of its attributes.
+    """A descriptor for `__doc__` that appends a list of attributes to the docstring of a class.
 
-    The list is read from the source when `__doc__` is, as by `help`: importing costs nothing.
+    The list is read from the source only when `__doc__` is accessed, for example by `help`, which
+    keeps imports fast.
 
     Args:
-        own: docstring of the class.
+        own: docstring that the class itself has.
     """
 
     def __init__(self, own: str) -> None:
@@ -102,6 +104,6 @@ def show_attributes(kind: type) -> None:
 
 
 def get_own_doc(kind: type) -> str:
-    """Return the docstring of a class without the list of its attributes; "" if it has none."""
+    """Return the docstring of a class without the list of its attributes, or "" if it has none."""
     own = kind.__dict__.get("__doc__")
     return inspect.cleandoc(own.own if isinstance(own, DocWithAttributes) else own or "")

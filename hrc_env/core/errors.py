@@ -1,16 +1,16 @@
-"""The errors of this package: each states the expected value, the given value and valid ones.
+"""Errors of this package; their messages state the expected value, the given value and valid ones.
 
     HRCError
-    ├── ConfigError            a setting, name, shape or value that cannot work (a ValueError)
-    │   ├── NoGoalError        a reward by goals of a task without goals
+    ├── ConfigError            an invalid setting, name, shape or value (a ValueError)
+    │   ├── NoGoalError        a goal-based reward for a task without goals
     │   └── NoAttributeError   an attribute that an environment does not have
-    ├── DownloadError          a download that failed or has another content
+    ├── DownloadError          a failed download, or one with unexpected content
     │   └── WeightsError       weights of the pose network
     ├── RenderingError         no OpenGL context
     ├── CheckpointError        a saved agent that does not fit its environment
     └── MissingExtraError      libraries of an extra that is not installed
 
-A worker out of sight is data (a growing covariance, a flag), never an error.
+A worker out of sight is reported as data (a growing covariance, a flag), never as an error.
 """
 
 import contextlib
@@ -23,31 +23,31 @@ T = TypeVar("T")
 
 
 class HRCError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base class of all errors that this package raises deliberately."""
 
 
 class ConfigError(HRCError, ValueError):
-    """A setting, name, shape or value that cannot work; the message has valid ones."""
+    """A setting, name, shape or value is invalid; the message names valid ones."""
 
 
 class NoGoalError(ConfigError, AttributeError):
-    """A reward by goals is requested for a task without goals; `hasattr` gives False."""
+    """A goal-based reward is requested for a task without goals; `hasattr` returns False."""
 
 
 class NoAttributeError(ConfigError, AttributeError):
-    """An environment has no attribute of this name; `hasattr` gives False."""
+    """An environment has no attribute of this name; `hasattr` returns False."""
 
 
 class DownloadError(HRCError, RuntimeError):
-    """A file that is downloaded once is not available, or is not the expected one."""
+    """A file cannot be downloaded, or its content is not the expected one."""
 
 
 class WeightsError(DownloadError):
-    """The pose network's weights are missing or are not the official ones."""
+    """The weights of the pose network are missing or are not the official ones."""
 
 
 class RenderingError(HRCError, RuntimeError):
-    """No OpenGL context could be made on this machine."""
+    """No OpenGL context could be created on this machine."""
 
 
 class CheckpointError(HRCError, RuntimeError):
@@ -55,12 +55,12 @@ class CheckpointError(HRCError, RuntimeError):
 
 
 class MissingExtraError(HRCError, ImportError):
-    """A feature needs libraries of an extra that is not installed."""
+    """A feature needs libraries of an optional extra that is not installed."""
 
 
 @contextlib.contextmanager
 def learner() -> Generator[None]:
-    """Turn a failed import of a learner's library into a `MissingExtraError` with the remedy."""
+    """Convert a failed import of a learning library into a `MissingExtraError` with the remedy."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -76,8 +76,8 @@ REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
 OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
 
 
-def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
-    """Return the error for an unknown name, with the nearest valid one.
+def make_unknown_name_error(what: str, got: object, valid: Iterable[str]) -> ConfigError:
+    """Return the error for an unknown name, which suggests the nearest valid one.
 
     Args:
         what: kind of the name, such as "shield".
@@ -92,10 +92,10 @@ def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
 
 
 def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> None:
-    """Raise `ConfigError` for the first of the names that is not valid, if there is one."""
+    """Raise `ConfigError` for the first invalid name, if there is one."""
     for name in names:
         if name not in valid:
-            raise unknown(what, name, valid)
+            raise make_unknown_name_error(what, name, valid)
 
 
 _MUST: dict[str, Callable[[float], bool]] = {
@@ -112,9 +112,9 @@ def check_fields(record: object, must: str, *names: str) -> None:
     """Raise `ConfigError` for the first field that violates a condition.
 
     Args:
-        record: the settings.
-        must: the condition, a key of `_MUST`.
-        names: the fields.
+        record: record of settings.
+        must: the condition, as a key of `_MUST`.
+        names: names of the fields.
     """
     for name in names:
         value = getattr(record, name)
@@ -122,8 +122,8 @@ def check_fields(record: object, must: str, *names: str) -> None:
             raise ConfigError(f"{name} must {must}, got {value}.")
 
 
-def needed(value: T | None, what: str) -> T:
-    """Return a value that must not be None, or raise `ConfigError`."""
+def require(value: T | None, what: str) -> T:
+    """Return a value, or raise `ConfigError` if it is None."""
     if value is None:
         raise ConfigError(f"{what} is asked for, and there is none here.")
     return value
@@ -133,16 +133,16 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
     """Raise `ConfigError` unless two shapes agree.
 
     Args:
-        what: name of the array, for the error.
-        got: its shape.
-        expected: the shape that it must have.
-        meaning: meaning of the axes, for the error.
+        what: name of the array, for the error message.
+        got: shape of the array.
+        expected: required shape.
+        meaning: meaning of the axes, for the error message.
     """
     if tuple(got) != tuple(expected):
         raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")
 
 
-def whole(what: str, value: Any, low: int, high: int) -> int:
+def check_integer(what: str, value: Any, low: int, high: int) -> int:
     """Return an integer from `low` to `high`, or raise `ConfigError`."""
     is_bool = isinstance(value, bool)
     if is_bool or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:

@@ -1,4 +1,4 @@
-"""Folders for files that are kept between runs, also where home or package are read-only."""
+"""Folders for files kept between runs, even if the home or package folder is read-only."""
 
 import contextlib
 import hashlib
@@ -11,9 +11,9 @@ from pathlib import Path
 
 
 def usual_cache() -> Path | None:
-    """Return the folder `hrc_env` in the user's caches; None without a home.
+    """Return the folder `hrc_env` in the user's cache, or None if there is no home directory.
 
-    It need not exist.
+    The folder need not exist.
     """
     chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
@@ -21,19 +21,19 @@ def usual_cache() -> Path | None:
     usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
     try:
         return Path(chosen or usual).expanduser() / "hrc_env"
-    except RuntimeError:  # no HOME, and no user of that number
+    except RuntimeError:  # no HOME, and an unknown user ID
         return None
 
 
 def user_cache() -> Path:
-    """Return the folder of the user's caches that can be written, or else a temporary one."""
+    """Return the user's cache folder if it is writable, or else a temporary folder."""
     usual = usual_cache()
     return usual if usual is not None and can_write(usual) else temporary_cache()
 
 
 @lru_cache(maxsize=1)
 def temporary_cache() -> Path:
-    """Return a folder among the temporary ones that only this user can write to."""
+    """Return a folder in the temporary directory to which only this user can write."""
     owner = getattr(os, "getuid", lambda: 0)()
     folder = Path(tempfile.gettempdir()) / f"hrc_env-{owner}"
     with contextlib.suppress(OSError):
@@ -48,7 +48,7 @@ def temporary_cache() -> Path:
 
 
 def can_write(folder: Path) -> bool:
-    """Return whether files can be written into a folder; it is made if possible."""
+    """Return whether files can be written to a folder, which is created if possible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -59,13 +59,13 @@ def can_write(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
-    """Hold the lock of a folder; `wait` is called if another program holds it."""
+    """Hold the lock of a folder; `wait` is called if another process holds it."""
     try:
         import fcntl
 
         name = hashlib.sha256(str(folder.absolute()).encode()).hexdigest()[:12]
         lock = (temporary_cache() / f"lock-{name}").open("w")
-    except (ImportError, OSError):  # no locks here, or no place for one: work is done twice
+    except (ImportError, OSError):  # no locks available: work is done twice
         yield
         return
     with lock:

@@ -1,9 +1,9 @@
-"""The numbers in info: their meanings, and stand-ins for numbers that were not measured.
+"""The numbers in info: their meanings, and substitutes for numbers that were not measured.
 
-Internally NaN stands where there was nothing to measure. Users receive infos with the same keys
-from the reset on and without NaN: the distance to an absent worker is infinite, and beside a finite
-stand-in a key states whether the number was measured. Words are encoded as indices; `worded`
-translates them.
+Internally, NaN marks a number that was not measured. Users receive infos with the same keys from
+the reset on and without NaN: the distance to an absent worker is infinite, and if the substitute is
+finite, another key states whether the number was measured. Names are encoded as indices, which
+`name_indices` decodes.
 """
 
 import fnmatch
@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.brought import described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.brought import describe
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
 """Numbers (B,) by name; NaN where an environment has none in this step."""
 ABSENT = "absent"
-"""Activity and body of a worker that is not in the episode; as a number -1."""
+"""Activity and body of a worker that is not in the episode; its index is -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
 CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 WORDS = {
@@ -31,9 +31,9 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Keys of `worded`, with the names in `OF_WORKERS` of the indices behind them."""
+"""Names in `OF_WORKERS` of the indices from which `name_indices` decodes each of its keys."""
 PEOPLE = ("activity", "body")
-"""Words that there are for each worker."""
+"""Names of the words that every worker has."""
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
@@ -62,19 +62,19 @@ RENAMED = {
     "task/worst_measured": "task/max_offset_measured",
     "task/worst_rad": "task/max_rotation_rad",
 }
-"""Present keys of infos that were renamed, by their former keys."""
+"""Current keys of renamed infos, by their former keys."""
 
 
 class InfoDict(dict[str, Any]):
-    """An info of a reset or a step, whose `KeyError` for a former key gives the present one."""
+    """Info of a reset or step, whose `KeyError` for a former key names the current key."""
 
     def __missing__(self, key: str) -> Any:
-        """Raise the `KeyError` for a key that is not there."""
+        """Raise a `KeyError` for a missing key."""
         raise KeyError(_describe_renaming(key) if key in RENAMED else key)
 
 
 def _describe_renaming(key: str) -> str:
-    """Return the message for a former key of an info."""
+    """Return the error message for a former key of an info."""
     return f"The info key {key!r} is called {RENAMED[key]!r} now."
 
 
@@ -82,13 +82,14 @@ class Entry(NamedTuple):
     """Description of a number in info."""
 
     unit: str
-    """Unit of the number, or its range."""
+    """Unit or range of the number."""
     meaning: str
     """Meaning of the number, as the documentation prints it."""
     stand_in: float | None = None
-    """Stand-in where it was not measured; None: it always is."""
+    """Value that is published if the number was not measured; None if it always is measured."""
     flag: str | None = None
-    """Key that states whether it was measured; None: another key or the stand-in shows it."""
+    """Key of the flag that states whether the number was measured; None if another key or the
+    substitute shows it."""
 
 
 CAME = "0 where no contact begins"
@@ -262,8 +263,8 @@ ENTRIES: dict[str, Entry] = {
     ),
     LIGHT: Entry("-", "drawn: strength of the light, 1 as built; at `pixels` and `keypoints`"),
 }
-"""Descriptions by key; those of reward terms, of each worker and of each camera are not
-included."""
+"""Descriptions of the numbers by key, except reward terms and the numbers of each worker and each
+camera."""
 OF_WORKERS: dict[str, str] = {
     "activity": "activity of worker N, as an index; -1: not in the episode",
     "body": "body of worker N, as an index; -1: not in the episode",
@@ -271,14 +272,14 @@ OF_WORKERS: dict[str, str] = {
     "motion in the step before: 0 towards the worker, 1 away, 2 neither; -1: none begins",
     "contact_region": "region of the body that this contact hits, as an index; -1: none",
 }
-"""Meanings of `worker_N/NAME`, N from 0."""
+"""Meanings of the keys `worker_N/NAME` by NAME; N counts from 0."""
 OWN = Entry("-", "", 0.0)
 """Description of a number that a user's task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
-"""Beginnings of keys that always have a value."""
+"""Prefixes of keys that always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")
-"""Beginnings of keys that concern the robot's belief."""
+"""Prefixes of keys that concern the robot's belief."""
 
 
 @cache
@@ -291,8 +292,8 @@ def entry_of(name: str) -> Entry:
     return OWN._replace(flag=f"{name}_measured")
 
 
-def published(info: Info) -> Info:
-    """Return numbers (B,) without NaN, with the keys that state whether they were measured."""
+def publish(info: Info) -> Info:
+    """Return numbers (B,) without NaN, and the flags that state whether they were measured."""
     told: Info = {}
     for name, values in info.items():
         entry = entry_of(name)
@@ -307,37 +308,38 @@ def published(info: Info) -> Info:
 
 
 def is_of_belief(name: str) -> bool:
-    """Return whether an info concerns the robot's belief; all others are counted on the truth."""
+    """Return whether an info concerns the robot's belief; all others describe the truth."""
     return name.startswith(OF_BELIEF)
 
 
-def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the keys of infos that match patterns, in the order of the infos.
+def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the keys of infos that match patterns, in the order of `names`.
 
     Args:
-        patterns: keys, or patterns as for files: "safety/*"; one may be given alone.
+        patterns: keys, or patterns of keys as for file names ("safety/*"); a single one is
+            permitted.
         names: the keys of all infos.
 
     Raises:
-        ConfigError: a pattern is no text or matches no key; the nearest key is named.
+        ConfigError: a pattern is not a string or matches no key; the message names the nearest key.
     """
     given = [patterns] if isinstance(patterns, str) else patterns
     if not is_sequence_of_text(given):
         raise ConfigError(
             'infos must be names or patterns of names, as ("cost", "safety/*"), got '
-            f"{described(patterns)}."
+            f"{describe(patterns)}."
         )
     for each in given:
         if each in RENAMED:
             raise ConfigError(_describe_renaming(each))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
-            raise unknown("info", each, [*folders, *names])
+            raise make_unknown_name_error("info", each, [*folders, *names])
     return tuple(name for name in names if any(fnmatch.fnmatchcase(name, each) for each in given))
 
 
 def of_workers(**parts: Ints) -> Info:
-    """Return the numbers of each worker from indices (B, W) by the names of `OF_WORKERS`."""
+    """Return one info per worker and name, from indices (B, W) named as in `OF_WORKERS`."""
     return {
         f"worker_{w}/{name}": part[:, w].astype(np.int64)
         for name, part in parts.items()
@@ -345,12 +347,12 @@ def of_workers(**parts: Ints) -> Info:
     }
 
 
-def worded(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
-    """Return the words for the indices in the info of one environment.
+def name_indices(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
+    """Decode the indices in the info of one environment to words.
 
     Args:
         info: info of a reset or step of a single environment.
-        words: words behind the indices, by the names of `OF_WORKERS`.
+        words: sequences of words to which the indices refer, by the names in `OF_WORKERS`.
 
     Returns:
         "worker/activity" and "worker/body": a name for each worker, "absent" for one that is not in

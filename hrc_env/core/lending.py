@@ -1,4 +1,4 @@
-"""Read-only views of arrays for functions of users, since others receive the same arrays."""
+"""Read-only views of arrays for users' functions, because other code uses the same arrays."""
 
 import functools
 from collections.abc import Callable, Collection
@@ -10,9 +10,9 @@ from hrc_env.core.typing import is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
 _CONSTANTS: dict[int, tuple[Any, Any]] = {}
-"""Read-only forms of records that never change, by identity."""
+"""Cached read-only forms of constant records, by `id` of the record."""
 _MOST = 64
-"""Number of records in `_CONSTANTS` above which they are forgotten."""
+"""Number of records in `_CONSTANTS` at which the cache is cleared."""
 
 
 def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
@@ -46,7 +46,7 @@ def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
 
 
 def constant(record: RecordT) -> RecordT:
-    """Return the read-only form of a record that never changes; it is made once."""
+    """Return the read-only form of a record that never changes; it is created once."""
     known = _CONSTANTS.get(id(record))
     if known is None or known[0] is not record:
         if len(_CONSTANTS) >= _MOST:
@@ -56,7 +56,7 @@ def constant(record: RecordT) -> RecordT:
 
 
 def is_of_user(function: Any) -> bool:
-    """Return whether a function was not defined in this package."""
+    """Return whether a function is defined outside this package."""
     try:
         return _is_of_user(function)
     except TypeError:  # an object with a __call__, not hashable
@@ -70,16 +70,16 @@ def _is_of_user(function: Any) -> bool:
     return str(getattr(function, "__module__", "")).partition(".")[0] != "hrc_env"
 
 
-def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
-    """Call a function of a user with read-only arguments.
+def call_user_function(what: str, function: Callable[..., Any], *given: Any) -> Any:
+    """Call a user's function with read-only arguments.
 
     Args:
-        what: name of the function, for the error.
-        function: the function.
-        given: its arguments, as `read_only` returns them.
+        what: name of the function, for the error message.
+        function: the user's function.
+        given: arguments of the function, as `read_only` returns them.
 
     Raises:
-        ConfigError: the function writes into an argument.
+        ConfigError: the function writes to an argument.
     """
     try:
         return function(*given)
@@ -90,7 +90,7 @@ def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
 
 
 def refuse_writing(what: str, error: ValueError) -> NoReturn:
-    """Raise `ConfigError` for a function that writes into its arguments."""
+    """Raise `ConfigError` for a function that writes to its arguments."""
     raise ConfigError(
         f"{what} writes into an array that it is given ({error}). It may only read it, as others "
         "are given the same: make a copy first (x = x.copy()), or a new array (x = x - y in place "
@@ -99,7 +99,7 @@ def refuse_writing(what: str, error: ValueError) -> NoReturn:
 
 
 def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> Any:
-    """Make a record of its fields without calling `__post_init__`."""
+    """Return a record with the given field values, without calling `__post_init__`."""
     if tuple in kind.__mro__:
         return kind(*values)
     made, write = object.__new__(kind), object.__setattr__

@@ -5,18 +5,19 @@ import os
 from pathlib import Path
 
 CGROUP = Path("/sys/fs/cgroup")
-"""Folder of a container's limits."""
+"""Folder with the resource limits of a container."""
 CORES = "HRC_ENV_CORES"
-"""Environment variable with the number of cores a process may use; engines set it for workers."""
+"""Environment variable with the number of cores a process may use; `engines` sets it for
+workers."""
 
 
 def n_cores() -> int:
-    """Return the number of threads or processes that can compute at once."""
+    """Return the number of threads or processes that can compute in parallel."""
     return math.ceil(usable_cores())
 
 
 def usable_cores() -> float:
-    """Return the cores that this process may use: by affinity, container and `CORES`."""
+    """Return the number of cores that this process may use: by affinity, container and `CORES`."""
     asked = os.environ.get(CORES, "")
     cores = float(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
     cores = cores or float(os.cpu_count() or 1)
@@ -34,7 +35,7 @@ def usable_memory_gb() -> float:
 
 
 def _limit(name: str) -> str:
-    """Return the content of a file of the container's limits; "" if there is none."""
+    """Return the content of a file with a container's limit, or "" if there is none."""
     try:
         return (CGROUP / name).read_text().strip()
     except OSError:

@@ -1,4 +1,4 @@
-"""Settings from plain mappings or TOML files, field by field, and back."""
+"""Conversion of settings from plain mappings or TOML files, and back."""
 
 import dataclasses
 import enum
@@ -15,20 +15,21 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy_scalar
 
 RecordT = TypeVar("RecordT")
 PRESETS: dict[Any, dict[str, Any]] = {}
-"""Named values by the type hint of their field: a name stands for the value."""
+"""Named values of settings: for each type hint of a field, the values by the names that it
+accepts."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
-    """Let a dataclass refuse an unknown keyword with a `ConfigError` instead of a `TypeError`.
+    """Make a dataclass raise `ConfigError` instead of `TypeError` for an unknown keyword.
 
-    The error names the nearest field, or the present name of one that was renamed: a class may list
-    these as `RENAMED: ClassVar[Mapping[str, str]]`, new names by old ones.
+    The error names the nearest field, or the current name of a renamed field; a class may list
+    renamed fields in `RENAMED: ClassVar[Mapping[str, str]]`, new names by old names.
     """
     init = record.__init__
     names = frozenset(each.name for each in dataclasses.fields(record))  # type: ignore[arg-type]
@@ -55,12 +56,12 @@ def from_mapping(
     Args:
         kind: the dataclass.
         mapping: values by field.
-        path: prefix of the fields' names in errors.
-        kinds: types of fields that the record's own hints leave open.
+        path: prefix of the field names in error messages.
+        kinds: types of fields whose hints in the dataclass leave the type open.
 
     Raises:
-        ConfigError: a field does not exist or is missing, has a value of another type or length, or
-            one that the dataclass refuses; the message has the path, as in `scene.cameras[0].name`.
+        ConfigError: a field is unknown or missing, its value has the wrong type or length, or the
+            dataclass rejects it; the message contains the path, as in `scene.cameras[0].name`.
     """
     hints = {**typing.get_type_hints(kind), **(kinds or {})}
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
@@ -70,7 +71,7 @@ def from_mapping(
         where = f"{path}{name}"
         if where not in names:
             raise _unknown_field(kind, "config field", path, name)
-        values[name] = restored(hints[name], value, where)
+        values[name] = convert_to_hint(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
         if nothing and each.name not in values:
@@ -82,19 +83,19 @@ def from_mapping(
 
 
 def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError:
-    """Return the error for a field that a record does not have, or no longer under this name."""
+    """Return the error for a field that is unknown or was renamed."""
     renamed = getattr(record, "RENAMED", {})
     if name in renamed:
         return ConfigError(f"The {what} {path}{name} is called {path}{renamed[name]} now.")
     names = [f"{path}{each.name}" for each in dataclasses.fields(record)]
-    return unknown(what, f"{path}{name}", names)
+    return make_unknown_name_error(what, f"{path}{name}", names)
 
 
-def restored(hint: Any, value: Any, where: str) -> Any:
+def convert_to_hint(hint: Any, value: Any, where: str) -> Any:
     """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
     if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
-            raise unknown(where, value, presets)
+            raise make_unknown_name_error(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
         if is_mapping(value):
@@ -124,36 +125,36 @@ def restored(hint: Any, value: Any, where: str) -> Any:
 
 
 def _name_or(hint: Any) -> str:
-    """Return the names that a field of this hint takes, as errors begin with them."""
+    """Return the preset names that a field accepts, as the beginning of an error message."""
     presets = PRESETS.get(hint, {})
     return f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
-    """Return a value converted to the first hint that fits; the error lists all of them."""
+    """Return a value converted to the first hint that fits; the error lists all hints."""
     refused: list[str] = []
     for hint in hints:
         try:
-            return restored(hint, value, where)
+            return convert_to_hint(hint, value, where)
         except ConfigError as error:
             refused.append(str(error))
     raise ConfigError(" Or: ".join(refused))
 
 
 def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
-    """Return a tuple whose parts are converted to their own hints, or raise `ConfigError`."""
+    """Return a tuple whose elements are converted to their hints, or raise `ConfigError`."""
     _checked(isinstance(value, list | tuple), f"{_name_or(hint)}a list", value, where)
     inner = typing.get_args(hint)
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
     _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
     return tuple(
-        restored(hint, part, f"{where}[{k}]")
+        convert_to_hint(hint, part, f"{where}[{k}]")
         for k, (hint, part) in enumerate(zip(hints, value, strict=True))
     )
 
 
 def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Return nested mappings as one; where both hold a value it is that of `above`."""
+    """Return two nested mappings merged into one; values of `above` take precedence."""
     both = {**below, **above}
     for name in below.keys() & above.keys():
         if isinstance(below[name], Mapping) and isinstance(above[name], Mapping):
@@ -161,16 +162,16 @@ def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     return both
 
 
-def plain(value: Any) -> Any:
-    """Return a value in JSON's types where it has such a form.
+def convert_to_plain(value: Any) -> Any:
+    """Return a value converted to JSON types if possible.
 
-    Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
-    function) are returned as they are; `for_json` refuses them.
+    Paths become strings; NumPy scalars and enumerations become their values. Other objects (a
+    recorded clip, a function) are returned unchanged; `for_json` rejects them.
     """
     if is_mapping(value):
-        return {name: plain(each) for name, each in value.items()}
+        return {name: convert_to_plain(each) for name, each in value.items()}
     if is_list_or_tuple(value):
-        return type(value)(map(plain, value))
+        return type(value)(map(convert_to_plain, value))
     if is_array(value) or is_numpy_scalar(value):
         return value.tolist()
     if isinstance(value, enum.Enum):
@@ -179,13 +180,13 @@ def plain(value: Any) -> Any:
 
 
 def for_json(value: Any, where: str) -> Any:
-    """Return a value in JSON's types, with records as mappings of their fields.
+    """Return a value converted to JSON types, with records as mappings of their fields.
 
     Raises:
-        ConfigError: a part has no such form: a function, a class, a recording; the message has its
-            path.
+        ConfigError: a part has no JSON form, such as a function, a class or a recording; the
+            message contains its path.
     """
-    value = plain(value)
+    value = convert_to_plain(value)
     if is_mapping(value):
         return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
     if is_list_or_tuple(value):
@@ -205,12 +206,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"The file {path} cannot be read: {error}.") from error
-    except ValueError as error:  # what tomllib and the decoder raise
+    except ValueError as error:  # from tomllib or the decoder
         raise ConfigError(f"{path} must be TOML; reading it ended with: {error}") from error
 
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:
-    """Return nested mappings, lists, text, numbers and booleans as TOML; None is left out."""
+    """Return nested mappings, lists, strings, numbers and booleans as TOML; None is omitted."""
     lines: list[str] = []
     tables: list[str] = []
     for name, value in content.items():
@@ -238,9 +239,9 @@ def _value(value: Any, where: str) -> str:
 
 
 def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
-    """Return an error of a dataclass with fields named by their path.
+    """Return the error of a dataclass with the names of fields replaced by their paths.
 
-    Names with an underscore are replaced anywhere, others at the beginning of the sentence.
+    Names with an underscore are replaced anywhere, others only at the beginning of the message.
     """
     if not path:
         return error

@@ -1,4 +1,4 @@
-"""Progress of long computations: a bar in a terminal, a line every ten seconds elsewhere."""
+"""Progress of long computations: a bar in a terminal, otherwise a line every ten seconds."""
 
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sized
@@ -16,9 +16,9 @@ Say = Callable[[float, str], None]
 
 
 class Meter:
-    """Shows progress and the remaining time of a computation.
+    """Display of the progress and the remaining time of a computation.
 
-    Counts are shown if they have a unit. Where there is no terminal, plain lines are printed.
+    Counts are shown if they have a unit. Without a terminal, plain lines are printed.
     """
 
     def __init__(
@@ -57,8 +57,8 @@ class Meter:
         """Show the progress.
 
         Args:
-            done: the amount that is done, out of `total`.
-            name: the current activity; None: as before.
+            done: completed amount, out of `total`.
+            name: current activity; None keeps the previous one.
             note: a remark, such as the latest result.
         """
         self.done, self.name, self.note = done, name or self.name, note
@@ -71,7 +71,7 @@ class Meter:
         self._bar.console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
     def _say(self) -> None:
-        """Print one line with share, count, elapsed and remaining time."""
+        """Print a line with the completed share, the count, and the elapsed and remaining time."""
         self._line_s, task = self._clock(), self._bar.tasks[0]
         passed_s, since = self._line_s - self._began_s, self.done - self._before
         left = _time(max(self.total - self.done, 0.0) / since * passed_s) if since > 0 else "?"
@@ -91,13 +91,13 @@ def progress_bar(console: Console, name: str) -> Generator[Say]:
 def track(
     values: Iterable[T], description: str, total: int | None = None, console: Console | None = None
 ) -> Iterator[T]:
-    """Yield the values one after the other while their progress is shown.
+    """Yield the values one by one while showing the progress.
 
     Args:
         values: the values.
         description: name of the computation.
-        total: number of values; None: their length.
-        console: where it is shown; None: on the standard output.
+        total: number of values; None for the length of `values`.
+        console: console for the progress bar; None for the standard output.
     """
     n = len(values) if total is None and isinstance(values, Sized) else total or 0
     with Meter(console or Console(), description, n) as meter:

@@ -1,11 +1,11 @@
-"""Records that the components exchange: frozen records of arrays, the batch axis first.
+"""Records exchanged between components: frozen records of arrays whose first axis is the batch.
 
 B environments, W workers, C cameras, J = 15 joints, S = 22 body segments, K capsules, N arm joints.
-World frame: +Z up, origin on the floor, metres, seconds, radians.
+World frame: +Z up, origin on the floor. Units: metres, seconds, radians.
 
-Belief and truth are different records on purpose: `PoseEstimate` is the cameras' estimate of a
-worker, `WorkerTruth` is the worker. Observations, rewards and shields take the first, cost and
-metrics the second (`tests/test_architecture.py` verifies this).
+Belief and truth are separate records: `PoseEstimate` is the workers' pose as estimated from the
+cameras, `WorkerTruth` is their true pose. Observations, rewards and shields read the former, cost
+and metrics the latter (`tests/test_architecture.py` verifies this).
 """
 
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ from hrc_env.core.typing import (
 class Keypoints:
     """Joints in the images, as a detector or its emulator reports them [px].
 
-    A joint that was not found is NaN with confidence 0: data, not an error.
+    A joint that was not found has NaN coordinates and confidence 0; this is not an error.
     """
 
     px: Points2
@@ -48,7 +48,7 @@ class Keypoints:
     measurement."""
     time_s: Floats | None = None
     """Time (B, C) at which each camera took its frame [s], on the tracker's clock, which is 0 at
-    the reset; NaN: no frame of that camera. None: every frame belongs to the present update."""
+    the reset; NaN if a camera has no frame. None if every frame belongs to the current update."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,38 +66,40 @@ class Roi:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PoseEstimate:
-    """The belief about the workers.
+    """The belief: the estimated state of the workers.
 
-    It is everything that reward, observation, shield and agent know about them.
+    Rewards, observations, shields and agents receive no other information about the workers.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {"blind_s": "unobserved_s"}
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their old names."""
 
     mean_world: Points3
-    """Means of the joints (B, W, J, 3) in the world frame [m]; without a track: the documented
-    prior."""
+    """Mean positions of the joints (B, W, J, 3) in the world frame [m]; without a track, those of
+    the documented prior."""
     cov_world: Covariances3
     """Covariance of each joint's position (B, W, J, 3, 3) [m^2], always finite and positive
     definite."""
     velocity_world: Velocities3
-    """(B, W, J, 3) [m/s]."""
+    """Velocities of the joints (B, W, J, 3) in the world frame [m/s]."""
     age_s: Floats
-    """Time since a measurement last supported each joint (B, W, J) [s]."""
+    """Time since each joint was last supported by a measurement (B, W, J) [s]."""
     tracked: Bools
-    """Whether each slot has a track (B, W); False: prior, or predicted for too long (lost)."""
+    """Whether each slot has a track (B, W); otherwise it has the prior, or a prediction that has
+    lasted too long (lost)."""
     unknown: Bools = None  # type: ignore[assignment]
     """Whether a person without a track may be in the slot (B, W): lost, not searched for enough,
     detected but not tracked, or on floor that no two cameras see (`tracking.presence`); True for
     all slots while there are more people than slots. A slot that is neither tracked nor unknown is
     empty. Default: every slot without a track is unknown."""
     unobserved_s: Floats = None  # type: ignore[assignment]
-    """Time since the cameras last observed the worker, or that the slot is empty (B, W) [s];
-    without any observation, the time since the reset. Default: age of the joint with the youngest
-    measurement."""
+    """Time since the cameras last observed the worker or saw that the slot is empty (B, W) [s];
+    without any observation, the time since the reset. Default: age of the joint with the most
+    recent measurement."""
     seen_world: Points3 = None  # type: ignore[assignment]
-    """Last detected place of the worker (B, W, J, 3) [m]; NaN without any detection, or if the
-    place was seen empty since. Default: the mean of a track."""
+    """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN without any
+    detection, or if that location was seen empty since. Default: the means of slots with a track,
+    otherwise NaN."""
 
     def __post_init__(self) -> None:
         try:
@@ -123,7 +125,7 @@ class PoseEstimate:
 
 @dataclass(frozen=True, slots=True)
 class WorkerPath:
-    """Places of the workers' bodies after every physics step, which physics and cost follow."""
+    """Poses of the workers' bodies after every physics step, which physics and cost use."""
 
     position_world: Points3
     """Origins of the 22 body segments after every physics step (B, T, W, S, 3) [m]."""
@@ -133,19 +135,19 @@ class WorkerPath:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Objects in the workers' hands, and then objects that lie ready; see `props.PROPS`."""
+    """Objects in the workers' hands, followed by L objects that lie ready; see `props.PROPS`."""
 
     kind: Ints
-    """Kind of each object (B, W + L), as an index into `props.PROPS`; 0: none."""
+    """Kind of each object (B, W + L), as an index into `props.PROPS`; 0 for no object."""
     position_world: Points3
-    """Origin of each object's frame (B, W + L, 3) [m]; meaningless where there is none."""
+    """Origin of each object's frame (B, W + L, 3) [m]; meaningless where there is no object."""
     quaternion_wxyz: QuaternionsWxyz
     """Orientation of each object (B, W + L, 4), world_from_prop."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerMotion:
-    """Pose and velocity of the workers' bodies, as the motion generator returns them."""
+    """Poses and velocities of the workers' bodies, as the motion generator returns them."""
 
     position_world: Points3
     """Origins of the 22 body segments (B, W, S, 3) [m]."""
@@ -156,9 +158,10 @@ class WorkerMotion:
     angular_velocity_world: Floats
     """Angular velocities of the segments in the world frame (B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """Objects that the workers hold and that lie ready for them; None: none."""
+    """Objects that the workers hold and that lie ready for them; None if there are none."""
     body: Ints | None = None
-    """Index of each worker's body among the scene's (B, W); None: all have the first."""
+    """Index of each worker's body among the scene's bodies (B, W); None if all have the first
+    one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,18 +169,18 @@ class WorkerTruth:
     """The true workers; only emulators of detectors, cost and metrics read this record."""
 
     joints_world: Points3
-    """True joints in BlazePose's sense (B, W, J, 3) [m]."""
+    """True positions of the joints (B, W, J, 3), defined as in BlazePose [m]."""
     velocity_world: Velocities3
-    """(B, W, J, 3) [m/s]."""
+    """Velocities of the joints (B, W, J, 3) [m/s]."""
     capsules_world: Capsules
-    """Capsules of the bodies (B, W, K, 2, 3), end points [m]."""
+    """End points of the capsules of the bodies (B, W, K, 2, 3) [m]."""
     capsule_radius_m: Floats
     """Radii of these capsules (B, W, K) [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """The robot's state by its own encoders: exact, so neither belief nor truth."""
+    """State of the robot from the robot's encoders: exact, hence neither belief nor truth."""
 
     q: JointAngles
     """Joint positions (B, N) [rad], of slides [m]."""
@@ -188,31 +191,33 @@ class RobotState:
     tool_velocity_world: Velocities3
     """Velocity of the tool point (B, 3) [m/s]."""
     tool_axes_world: Floats
-    """Axes x, y and z of the tool as columns (B, 3, 3)."""
+    """Axes x, y and z of the tool in the world frame, as columns (B, 3, 3)."""
     capsules_world: Capsules
-    """Capsules of the robot and its loads (B, K, 2, 3), end points [m]; those of absent loads are
-    far away."""
+    """End points of the capsules of the robot and its loads (B, K, 2, 3) [m]; those of absent loads
+    are far away."""
     capsule_radius_m: Floats
     """Radii of these capsules (K,) [m]."""
     slides: Bools | None = None
-    """Whether each joint is a slide (N,), with q in m and qd in m/s; None: none is."""
+    """Whether each joint is a slide (N,), with `q` in m and `qd` in m/s; None if there is no
+    slide."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandState:
-    """The gripper's state by its own encoders."""
+    """State of the gripper from the robot's encoders."""
 
     opening_m: Floats
     """Distance of each finger from the middle (B,) [m]."""
     force_n: Floats
-    """Force with which the motor presses the fingers together (B,) [N]; negative: apart."""
+    """Force with which the motor presses the fingers together (B,) [N]; negative if it opens
+    them."""
     closed_on: Bools
     """Whether the fingers press and rest on an object (B,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectState:
-    """The loose objects of a task: true or measured poses."""
+    """Poses and velocities of a task's loose objects, either true or measured."""
 
     position_world: Points3
     """Centre of each object (B, O, 3) [m]."""
@@ -221,6 +226,6 @@ class ObjectState:
     velocity_world: Velocities3
     """Velocity of the centre (B, O, 3) [m/s]."""
     spin_object: Floats
-    """Angular velocity about the object's own axes (B, O, 3) [rad/s]."""
+    """Angular velocity in the object's frame (B, O, 3) [rad/s]."""
     held: Bools
     """Whether the robot holds the object (B, O)."""

@@ -1,6 +1,6 @@
 """Registries of objects by name: those of the package and those that users register.
 
-A name that was registered in the parent process is known here, too; its object is unpickled on its
+A name that was registered in the parent process is available here, too; its object is unpickled on
 first use. A registration in this process replaces it.
 """
 
@@ -19,25 +19,28 @@ from hrc_env.core.snapshot import Entry, Snapshot
 
 ObjectT = TypeVar("ObjectT")
 FILES: dict[str, str] = {}
-"""Python files that this process imported, with the text of their errors; "": none."""
+"""Python files that this process imported, with the error message of each; "" if it had no
+error."""
 _LOCK = threading.RLock()
 _REGISTRIES: "dict[str, Registry[Any]]" = {}
 _IMPORTING: list[str] = []
-"""Files that are being imported; "" for one that every child process imports itself."""
+"""Files that are being imported, the innermost last; "" for a file that every child process imports
+by itself."""
 
 
 class Registry(UserDict[str, ObjectT]):
-    """Objects of one kind by name."""
+    """Registry of objects of one kind by name."""
 
     def __init__(self, kind: str, known: Mapping[str, ObjectT] | None = None) -> None:
         super().__init__(known or {})
         self.kind = kind
         self.own: dict[str, str | None] = {}
-        """Names that were registered in this process, with the files that registered them."""
+        """Names that were registered in this process, with the file that registered each; None if
+        no file is known."""
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:
-        """Add an object, for child processes as well; `ConfigError` for a name that is taken."""
+        """Register an object, also for child processes; a name that is taken is a `ConfigError`."""
         taken = name in self.data and (name in self.own or name not in self.inherited)
         if taken:
             raise ConfigError(f"There is the {self.kind} {name!r} already; choose another name.")
@@ -52,7 +55,7 @@ class Registry(UserDict[str, ObjectT]):
         return snapshot.inherited().entries.get(self.kind, {})
 
     def name_of(self, thing: object) -> str | None:
-        """Return the name of an object; None: it has none."""
+        """Return the name of an object, or None if it is not registered."""
         return next((name for name, each in self.data.items() if each is thing), None)
 
     def __contains__(self, name: object) -> bool:
@@ -88,9 +91,9 @@ def importing(file: str, recorded: bool) -> Generator[None]:
 
 
 def share() -> None:
-    """Bring the registrations of this process up to date for child processes.
+    """Make the current registrations of this process available to child processes.
 
-    Functions that are defined in a script or notebook are sent with the present values of their
+    Functions that are defined in a script or notebook are sent with the current values of their
     globals. This runs with every registration and whenever an environment is made.
     """
     with _LOCK:
@@ -109,12 +112,12 @@ def _entry(thing: Any, file: str | None, own: set[int]) -> Entry:
         return Entry(file=file, max_episode_steps=limit)
     try:
         return Entry(_pickled(thing, own), max_episode_steps=limit)
-    except Exception as error:  # whatever objects of others raise
+    except Exception as error:  # users' objects may raise anything
         return Entry(refused=f"{type(error).__name__}: {error}", max_episode_steps=limit)
 
 
 def _pickled(thing: Any, own: set[int]) -> bytes:
-    """Pickle a registered object by value, so that a script or a notebook can define it."""
+    """Pickle a registered object by value, which permits objects from scripts and notebooks."""
     import cloudpickle  # type: ignore[reportMissingTypeStubs]  # takes time to import
 
     pickler: Any = cloudpickle.Pickler

@@ -1,4 +1,4 @@
-"""The names of files in which child processes find the registrations of this one."""
+"""Names of the files in which child processes find the registrations of this process."""
 
 import os
 from tempfile import gettempdir
@@ -6,14 +6,15 @@ from tempfile import gettempdir
 VARIABLE = "HRC_ENV_REGISTERED"
 """Environment variable with the files of this process, its parent, its grandparent and so on.
 
-They are separated as the folders in PATH; the first that exists counts; see `core.snapshot`.
+The paths are separated like the folders in PATH; the first existing file is used. See
+`core.snapshot`.
 """
 
 
 def reserve() -> str:
-    """Name a file for child processes, and return the inherited file that exists; empty: none.
+    """Reserve a file name for child processes, and return the inherited file, or "" for none.
 
-    Processes that are started before the first registration know its name, too.
+    Processes that are started before the first registration know the name, too.
     """
     named = os.environ.get(VARIABLE, "")
     found = existing(named)
@@ -23,14 +24,14 @@ def reserve() -> str:
 
 
 def prepend(folder: str) -> str:
-    """Name a file of this process in a folder before the others, and return its path."""
+    """Put a new file of this process in front of `VARIABLE`, and return its path."""
     path = os.path.join(folder, f"{os.getpid()}_{os.urandom(4).hex()}.pickle")
     os.environ[VARIABLE] = os.pathsep.join(filter(None, (path, os.environ.get(VARIABLE))))
     return path
 
 
 def existing(named: str) -> str:
-    """Return the first of several files that exists; empty: none does."""
+    """Return the first of several files that exists, or "" if none exists."""
     return next((path for path in named.split(os.pathsep) if path and os.path.exists(path)), "")
 
 

@@ -1,4 +1,4 @@
-"""results.json, the format in which benchmarks and experiments write numbers and their origin."""
+"""results.json, the format of the results of benchmarks and experiments and their provenance."""
 
 import contextlib
 import json
@@ -25,19 +25,19 @@ class Metric:
     """A number with its interval and sample size."""
 
     value: float
-    """Mean, rate, share or median."""
+    """Value of the metric: a mean, rate, share or median."""
     low: float
     """Lower end of a 95 % interval, or the smallest of several runs."""
     high: float
     """Upper end of a 95 % interval, or the largest of several runs."""
     unit: str
-    """Unit of the three numbers, such as "m" or "1/min"; "1": none."""
+    """Unit of the three numbers, such as "m" or "1/min"; "1" for none."""
     n: int
     """Number of observations."""
 
 
 def over(values: Sequence[float], unit: str) -> Metric:
-    """Return the median of repeated measurements with their smallest and largest."""
+    """Return the median of repeated measurements, with the smallest and largest as the interval."""
     return Metric(
         float(np.median(values)), float(np.min(values)), float(np.max(values)), unit, len(values)
     )
@@ -71,7 +71,7 @@ def write_results(
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file atomically, and make its folder; on failure the former content stays."""
+    """Write a file atomically and create its folder; on failure the old content is kept."""
     draft = path.with_name(path.name + ".draft")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -87,7 +87,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def versions() -> dict[str, str | None]:
-    """Return the versions of libraries that numbers depend on; None: not installed."""
+    """Return the versions of libraries that affect results; None for one that is not installed."""
     return {name: _version(name) for name in PACKAGES}
 
 
@@ -99,9 +99,9 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """Return the commit; None outside a checkout.
+    """Return the commit of the checkout, or None outside a checkout.
 
-    It ends in "+changes" if files outside of docs differ.
+    It ends in "+changes" if files outside docs are modified.
     """
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():

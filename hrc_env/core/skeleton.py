@@ -1,8 +1,8 @@
-"""The 15 joints as we read the paper's figure 1: names, pairs and bones.
+"""The 15 joints, as inferred from figure 1 of the paper: names, pairs and bones.
 
-The paper takes 15 of BlazePose's 33 landmarks, which its text does not name. A joint here has
-BlazePose's meaning (a "hip" is where BlazePose puts a hip), which is not the anatomical centre; the
-distances of the workers' true joints from the detector's are documented with the baked bodies.
+The paper uses 15 of BlazePose's 33 landmarks but does not name them. Joints are defined as in
+BlazePose (a "hip" is where BlazePose detects a hip), not as anatomical centres; the distances
+between the workers' true joints and the detector's are documented with the baked bodies.
 """
 
 import numpy as np
@@ -24,13 +24,13 @@ N_JOINTS = len(JOINTS)
 JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 
 BLAZEPOSE_INDEX: Ints = np.array([0, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28, 31, 32])
-"""Row of each of `JOINTS` in BlazePose's 33 landmarks (31, 32 are its foot tips)."""
+"""Index of each of `JOINTS` among BlazePose's 33 landmarks (31 and 32 are its foot tips)."""
 
 MIRROR: Ints = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13])
-"""Joint that takes this joint's place when left and right are exchanged."""
+"""Index of each joint's mirror image, with left and right exchanged."""
 
 TORSO: Ints = np.array([1, 2, 7, 8])
-"""Shoulders and hips: their mean is the root of the body."""
+"""Indices of the shoulders and hips, whose mean is the root of the body."""
 
 BONES: Ints = np.array(
     [
@@ -40,17 +40,18 @@ BONES: Ints = np.array(
         (0, 1), (0, 2),
     ]
 )  # fmt: skip
-"""Pairs of joints with a nearly constant distance."""
+"""Pairs of joints whose distance is nearly constant."""
 
 BONE_LENGTH_M: Floats = np.array(
     [.34, .20, .55, .55, .28, .26, .28, .26, .37, .40, .20, .37, .40, .20, .28, .28]
 )  # fmt: skip
-"""Lengths for an adult of unknown stature [m], standard deviation about 10 %: the mean of the
-baked bodies' joints, which lie where BlazePose puts them (its hips are higher and its toes
-farther out than anatomy's); refined per worker by the trackers that learn it."""
+"""Bone lengths of an adult of unknown stature [m], with a standard deviation of about 10 %: the
+mean over the baked bodies, whose joints are where BlazePose puts them (its hips are higher and its
+toes farther out than the anatomical ones). Trackers that learn bone lengths refine them for each
+worker."""
 
 SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
-    ((0,), (0,), 0.13),  # head, a sphere round the nose that reaches over the hat's front
+    ((0,), (0,), 0.13),  # head, a sphere around the nose that includes the hat's front
     ((1, 2), (7, 8), 0.16),  # trunk: mid-shoulder to mid-hip
     ((1,), (2,), 0.09),  # shoulder girdle
     ((7,), (8,), 0.13),  # pelvis
@@ -60,14 +61,14 @@ SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
     ((9,), (11,), 0.065), ((10,), (12,), 0.065),  # shanks
     ((11,), (13,), 0.055), ((12,), (14,), 0.055),  # feet
 )  # fmt: skip
-"""Body segments from joints alone: the joints with their mean as the first end, those of the second
-end, and the radius [m]."""
+"""Body segments defined by joints alone: the joints whose mean is the first end, those whose mean
+is the second end, and the radius [m]."""
 
 HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
     (3, 5, 0.18, 0.05),
     (4, 6, 0.18, 0.05),
 )
-"""Hands, which the 15 joints do not include: elbow, wrist, reach beyond the wrist [m], radius
+"""Hands, which are not among the 15 joints: elbow, wrist, length beyond the wrist [m], radius
 [m]."""
 
 

@@ -1,8 +1,8 @@
 """Snapshots: the registrations of a process in a private file that its child processes read.
 
-`reservation.VARIABLE` names the file from the import of this package on, so that children of any
-kind (spawn, forkserver, loky, Ray on this machine) find it however early they started. The file
-exists once something is registered; its process removes it at exit.
+`reservation.VARIABLE` names the file as soon as this package is imported, which lets child
+processes of any kind (spawn, forkserver, loky, Ray on this machine) find it even if they started
+before it was written. The file exists once an object is registered; its process removes it at exit.
 """
 
 import os
@@ -24,19 +24,16 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """The form in which a registered object reaches another process.
-
-    It is pickled, a file, or none.
-    """
+    """Form in which a registered object reaches another process: a pickle, a file, or neither."""
 
     pickled: bytes = b""
-    """The object by value; empty: not pickled."""
+    """The object, pickled by value; empty if it was not pickled."""
     file: str = ""
-    """Python file that registers it; empty: none."""
+    """Python file that registers the object; empty for none."""
     refused: str = ""
-    """Error of pickling it; empty: none."""
+    """Error raised when the object was pickled; empty for none."""
     max_episode_steps: int = 0
-    """Time limit of a task [control steps]."""
+    """Time limit of a task [control steps]; 0 for other objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +50,16 @@ class Snapshot:
 
 @dataclass(slots=True)
 class _State:
-    """The files of this process."""
+    """Registration files of this process and its parent."""
 
     source: str
-    """Files that may be inherited, as in `VARIABLE`; the first that exists counts."""
+    """Paths of files that may be inherited, as in `VARIABLE`; the first existing one is used."""
     pid: int
-    """Process to which `path` belongs."""
+    """ID of the process to which `path` belongs."""
     path: str
-    """File of this process."""
+    """Path of the file of this process."""
     written: Snapshot | None = None
-    """Content of that file; None: it was not written."""
+    """Content of that file; None if it was not written."""
     seen: tuple[int, int] = (0, 0)
     """Inode and modification time of the inherited file when it was last read."""
     inherited: Snapshot = Snapshot()
@@ -78,7 +75,7 @@ def inherited() -> Snapshot:
 
 
 def inherit(snapshot: Snapshot) -> None:
-    """Use the registrations of a process on another machine as inherited."""
+    """Use the registrations of a process on another machine as those of the parent process."""
     with _LOCK:
         _STATE.source, _STATE.inherited = "", snapshot
 
@@ -148,7 +145,7 @@ def _warn(said: str) -> None:
 
 
 def _begun() -> _State:
-    """Return the state at import."""
+    """Return the initial state, at import."""
     reserve()
     own, _, others = os.environ[VARIABLE].partition(os.pathsep)
     return _State(others, os.getpid(), own)

@@ -1,4 +1,4 @@
-"""Random generators derived from others, quickly: an episode takes five."""
+"""Fast derivation of random generators from other ones; an episode needs five."""
 
 import functools
 from typing import Any
@@ -12,10 +12,10 @@ WORDS = 4
 
 
 class _Words(ISpawnableSeedSequence):
-    """A seed that was drawn.
+    """A seed of random words, which are used without hashing.
 
-    To let `SeedSequence` hash it would take five times as long as everything else. It has the
-    attributes of a `SeedSequence`, from which other streams are derived (`appearance`).
+    Hashing them with `SeedSequence` would take five times as long as everything else. The class has
+    the attributes of a `SeedSequence`, from which other streams are derived (`appearance`).
     """
 
     spawn_key = ()
@@ -25,17 +25,17 @@ class _Words(ISpawnableSeedSequence):
 
     @property
     def entropy(self) -> list[int]:
-        """The words as a `SeedSequence` takes them."""
+        """The words in the form that `SeedSequence` accepts."""
         return self.words.tolist()
 
     def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[Any]:
-        """Return the words unchanged to the generator they were drawn for."""
+        """Return the words unchanged for the type of generator for which they were drawn."""
         if n_words == WORDS and np.dtype(dtype) == np.uint64:
             return self.words
         return self._sequence.generate_state(n_words, dtype)
 
     def spawn(self, n_children: int) -> list[Any]:
-        """Return seeds of child generators; nothing is drawn for them."""
+        """Return seeds of child generators, without drawing random numbers for them."""
         return self._sequence.spawn(n_children)
 
     @functools.cached_property
@@ -47,8 +47,8 @@ def aside(rng: np.random.Generator, number: int) -> np.random.Generator:
     """Return a generator that depends on the seed of `rng`, but not on the numbers drawn from it.
 
     Args:
-        rng: the generator, which stays as it is.
-        number: the purpose; each has one of its own, far above the number of children.
+        rng: the generator, which is not changed.
+        number: number of the purpose, unique and far above the number of children.
     """
     seeds: Any = rng.bit_generator.seed_seq
     key = (*seeds.spawn_key, number)
@@ -56,7 +56,7 @@ def aside(rng: np.random.Generator, number: int) -> np.random.Generator:
 
 
 def children(rng: np.random.Generator, n: int) -> list[np.random.Generator]:
-    """Return `n` generators with seeds drawn from `rng`; other ones at each call."""
+    """Return `n` generators with seeds drawn from `rng`; each call returns different ones."""
     drawn = rng.integers(0, 2**64, (n, WORDS), np.uint64)
     seeds: list[Any] = [_Words(words) for words in drawn]
     return [np.random.Generator(np.random.PCG64(seed)) for seed in seeds]

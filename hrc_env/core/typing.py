@@ -1,8 +1,8 @@
-"""Array aliases: the shape and the unit of an argument, spelled once.
+"""Type aliases for arrays, which state the shape and the unit of an argument.
 
-Axes, everywhere in this package: B batch (environments), W workers, C cameras,
-J joints (15, see `hrc_env.core.skeleton`), S body segments of the worker (22), K capsules,
-P particles, T time, N links of the arm.
+Axes, everywhere in this package: B batch (environments), W workers, C cameras, J joints (15, see
+`hrc_env.core.skeleton`), S body segments of the worker (22), K capsules, P particles, T time, N
+links of the arm.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
 Records: TypeAlias = NDArray[Any]
-"""A structured array: rows with named fields, which its dtype explains."""
+"""A structured array, whose rows have named fields; its dtype describes them."""
 
 Points2: TypeAlias = Annotated[Floats, "(..., 2) [px]"]
 Points3: TypeAlias = Annotated[Floats, "(..., 3) [m]"]
@@ -30,11 +30,11 @@ JointVelocities: TypeAlias = Annotated[Floats, "(..., N) [rad/s]"]
 Image: TypeAlias = Annotated[NDArray[np.uint8], "(H, W, 3) RGB"]
 Tensor: TypeAlias = NDArray[np.float32]
 Rngs: TypeAlias = list[np.random.Generator]
-"""One for each environment of a batch."""
+"""Random generators, one for each environment of a batch."""
 
 
 class Vector3(NamedTuple):
-    """Three coordinates that a kernel returns, in the frame and unit that it states."""
+    """Three coordinates; the function that returns them states their frame and unit."""
 
     x: float
     """First coordinate."""
@@ -45,27 +45,27 @@ class Vector3(NamedTuple):
 
 
 def is_array(value: object) -> TypeGuard[NDArray[Any]]:
-    """Return whether a value is an array, of whatever dtype."""
+    """Return whether a value is an array of any dtype."""
     return isinstance(value, np.ndarray)
 
 
 def is_dict(value: object) -> TypeGuard[dict[Any, Any]]:
-    """Return whether a value is a dictionary, of whatever types."""
+    """Return whether a value is a dictionary, with keys and values of any type."""
     return isinstance(value, dict)
 
 
 def is_mapping(value: object) -> TypeGuard[Mapping[Any, Any]]:
-    """Return whether a value is a mapping, of whatever types."""
+    """Return whether a value is a mapping, with keys and values of any type."""
     return isinstance(value, Mapping)
 
 
 def is_list_or_tuple(value: object) -> TypeGuard[list[Any] | tuple[Any, ...]]:
-    """Return whether a value is a list or a tuple, of whatever types."""
+    """Return whether a value is a list or a tuple, with elements of any type."""
     return isinstance(value, list | tuple)
 
 
 def is_numpy_scalar(value: object) -> TypeGuard["np.generic[Any]"]:
-    """Return whether a value is a single value of NumPy's, of whatever type."""
+    """Return whether a value is a NumPy scalar of any type."""
     return isinstance(value, np.generic)
 
 

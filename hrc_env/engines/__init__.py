@@ -1,1 +1,1 @@
-"""Engines, which compute the parts of an experiment: this process, others, or Ray."""
+"""Engines, which compute the parts of an experiment in this process, in others, or with Ray."""

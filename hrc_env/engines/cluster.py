@@ -1,4 +1,4 @@
-"""Clusters of Ray: connection, machines, and the requirements that these must meet."""
+"""Connection to Ray clusters, and checks of the requirements on their machines."""
 
 import os
 import socket
@@ -28,9 +28,9 @@ START_S = "300"
 ANSWER_S = 10.0
 """Greatest time that a cluster may take to answer [s]."""
 STORE_BYTES = 500_000_000
-"""Shared memory of a cluster on this machine."""
+"""Size of the shared memory of a cluster that is started on this machine [bytes]."""
 Note = Callable[[str], None]
-"""Receives a sentence for the user."""
+"""Callback that receives a message for the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +46,17 @@ class Machine:
 def connected(
     address: str | None, note: Note = print, dashboard: bool = False
 ) -> Iterator[list[Machine]]:
-    """Connect to a cluster; yield its machines.
+    """Connect to a cluster and yield its machines.
 
     Args:
         address: address of a cluster: "auto" on one of its machines, "HOST:6379", or
-            "ray://HOST:10001"; None: one is started on this machine, and stopped at the end.
-        note: receives notes on the cluster.
-        dashboard: whether a cluster on this machine has Ray's dashboard.
+            "ray://HOST:10001"; None: a cluster is started on this machine and stopped at the end.
+        note: callback that receives messages about the cluster.
+        dashboard: whether a cluster started on this machine runs Ray's dashboard.
 
     Raises:
-        ConfigError: there is no cluster, it has another version of Ray or Python, or requires a
-            token.
+        ConfigError: there is no cluster at the address, its version of Ray or Python differs, or it
+            requires a token.
     """
     os.environ.setdefault("RAY_raylet_start_wait_time_s", START_S)
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
@@ -84,7 +84,7 @@ def connected(
 
 
 def _check_answers(address: str) -> None:
-    """Raise `ConfigError` if nothing listens at an address; Ray itself would try for minutes."""
+    """Raise `ConfigError` if nothing listens at an address; Ray itself would retry for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not (host and port.isdigit()):
         raise ConfigError(f"--address must be auto, HOST:PORT or ray://HOST:PORT, got {address!r}.")
@@ -95,14 +95,14 @@ def _check_answers(address: str) -> None:
 
 
 def _refused(address: str | None, error: Exception, remedy: str) -> ConfigError:
-    """Return the error of a cluster that cannot be used."""
+    """Return the error for a cluster that cannot be used."""
     where = "on this machine" if address is None else f"at {address!r}"
     said = " ".join(str(error).split())[:400]
     return ConfigError(f"No cluster of Ray {where}: {remedy}. ({said})")
 
 
 def _remedy(said: str) -> str:
-    """Return the remedy for an error of Ray."""
+    """Return the remedy for an error message of Ray."""
     if "ersion mismatch" in said:
         return "all machines must have the same versions of Ray and of Python"
     if "oken" in said:
@@ -114,7 +114,7 @@ def _remedy(said: str) -> str:
 
 
 def list_machines() -> list[Machine]:
-    """Return the living machines of the cluster that have cores."""
+    """Return the machines of the cluster that are alive and have CPU cores."""
     return [
         Machine(each["NodeID"], each["NodeManagerAddress"], each["Resources"]["CPU"])
         for each in ray.nodes()
@@ -123,12 +123,12 @@ def list_machines() -> list[Machine]:
 
 
 def share_of(workers: int, machines: list[Machine], note: Note = print) -> float:
-    """Return the share of a core that each worker counts as, so that all fit.
+    """Return the share of a core to reserve for each worker, so that all workers fit.
 
     Args:
         workers: number of workers.
         machines: machines of the cluster.
-        note: receives a warning if there are more workers than cores.
+        note: callback that receives a warning if there are more workers than cores.
     """
     n = sum(each.n_cores for each in machines)
     if workers <= n:
@@ -145,16 +145,17 @@ def check_machines(
 
     Args:
         machines: machines of the cluster.
-        works: called on each machine; the message of its `HRCError` names the missing requirement.
-        note: receives the addresses of machines that are waited for.
+        works: check to run on each machine; it raises an `HRCError` that names what is missing.
+        note: callback that receives the addresses of machines that are still compiling.
 
     Raises:
-        ConfigError: a machine lacks the package, has another version of it, or `works` fails on it.
+        ConfigError: a machine lacks the package or has another version of it, or `works` fails on
+            the machine.
     """
     registrations = pack()
     asked = {
         _on(each).remote(registrations, works): each for each in machines
-    }  # one task a machine
+    }  # one task per machine
     waiting = [*asked]
     while waiting:
         done, waiting = ray.wait(waiting, timeout=20)
@@ -169,13 +170,13 @@ SETUP = "`python -m hrc_env setup` on each machine, or in their image, does so b
 
 
 def _on(machine: Machine) -> Any:
-    """Return the task that describes a machine, to be run there."""
+    """Return the function `_describe` as a Ray task that runs on the given machine."""
     where = NodeAffinitySchedulingStrategy(machine.id, soft=False)
     return ray.remote(_describe).options(scheduling_strategy=where, num_cpus=0, max_retries=1)
 
 
 def _describe(registrations: Registrations, works: Callable[[], None] | None) -> str:
-    """Return the version of this package on this machine."""
+    """Check this machine and return the version of this package on it."""
     with plain_errors():
         registrations.unpack()
         if works is not None:
@@ -184,7 +185,7 @@ def _describe(registrations: Registrations, works: Callable[[], None] | None) ->
 
 
 def _check_answer(answer: Any, machine: Machine) -> None:
-    """Raise `ConfigError` for a machine that cannot work."""
+    """Raise `ConfigError` if a machine failed its check or has another version of the package."""
     try:
         theirs = ray.get(answer)
     except RayError as error:
@@ -197,7 +198,7 @@ def _check_answer(answer: Any, machine: Machine) -> None:
 
 
 def reason_of(error: BaseException) -> str:
-    """Return the message of a worker's error."""
+    """Return the message of an error that a worker raised."""
     cause: Any = getattr(error, "cause", None) if isinstance(error, RayTaskError) else None
     found = cause if isinstance(cause, BaseException) else error
     while isinstance(found, RayTaskError) and isinstance(found.cause, BaseException):
@@ -218,7 +219,7 @@ def reason_of(error: BaseException) -> str:
 
 @contextmanager
 def plain_errors() -> Iterator[None]:
-    """Raise errors of this package without their causes, which other processes may not unpickle."""
+    """Raise errors of this package without their causes, which may fail to unpickle elsewhere."""
     try:
         yield
     except HRCError as error:
@@ -226,5 +227,5 @@ def plain_errors() -> Iterator[None]:
 
 
 def one_core() -> None:
-    """Let this process, a worker's, compute on one core."""
+    """Restrict the computations of this worker process to one core."""
     os.environ[CORES] = "1"

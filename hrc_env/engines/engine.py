@@ -1,19 +1,20 @@
-"""Engines by name, and their protocol."""
+"""The interface of engines, and their choice by name."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from hrc_env.core.errors import ConfigError, check_names, whole
+from hrc_env.core.errors import ConfigError, check_integer, check_names
 
 Tick = Callable[[float], None]
-"""Receives the increase of the completed share of a call."""
+"""Callback that receives the increase of the completed share of a call."""
 Call = Callable[[Tick], Any]
-"""A computation that depends only on its construction: its result is the same everywhere."""
+"""Function of a `Tick`; its result does not depend on the process that computes it."""
 ENGINES = ("serial", "processes", "ray")
-"""`serial` computes one call after the other in this process, whose environments share all cores;
-`processes` as many at once as there are cores, on one thread each; `ray` as tasks of Ray."""
+"""Names of engines. `serial` computes calls one after the other in this process, whose environments
+share all cores; `processes` computes as many calls in parallel as there are cores, each on one
+thread; `ray` computes them as tasks of a Ray cluster."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,34 +22,34 @@ class Done:
     """Result of a call."""
 
     k: int
-    """Number of the call."""
+    """Index of the call."""
     result: Any
     seconds: float
-    """Duration of the call."""
+    """Duration of the call [s]."""
 
 
 class Engine(Protocol):
-    """Computes calls."""
+    """Interface of an engine, which computes calls."""
 
     @property
     def is_parallel(self) -> bool:
-        """True if calls run in other processes, which must be able to unpickle them."""
+        """Whether calls run in other processes, which must be able to unpickle them."""
         ...
 
     def opened(self) -> AbstractContextManager[object]:
-        """Return a context in which one run after the other has the same workers, if they can."""
+        """Return a context in which successive runs use the same workers, if the engine can."""
         ...
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls; yield each result as soon as it is there, in any order.
+        """Compute calls and yield each result as soon as it is available, in any order.
 
         Args:
             calls: functions of a `Tick`.
-            tick: receives the number of a call and the increase of its completed share; for a call
-                in another process once, at its end.
+            tick: callback that receives the index of a call and the increase of its completed
+                share; for a call in another process, it is called only once, at the end.
 
         Raises:
-            HRCError: an error of a call; or a worker died repeatedly.
+            HRCError: a call raised it, or a worker died repeatedly.
         """
         ...
 
@@ -56,20 +57,20 @@ class Engine(Protocol):
 def engine_called(
     name: str | None, workers: int | None = None, address: str | None = None
 ) -> Engine | None:
-    """Return an engine.
+    """Return an engine by name.
 
     Args:
-        name: one of `ENGINES`; None: no engine.
-        workers: number of calls at a time; None: the number of cores.
-        address: address of a cluster of Ray; None: one that is started on this machine.
+        name: one of `ENGINES`, or None for no engine.
+        workers: number of calls computed in parallel; None: the number of cores.
+        address: address of a Ray cluster; None: a new cluster is started on this machine.
 
     Raises:
-        ConfigError: there is no such engine, or it takes no workers or no address.
+        ConfigError: the engine does not exist, or it does not accept workers or an address.
     """
     if name is not None:
         check_names("engine", [name], ENGINES)
     if workers is not None:
-        whole("workers", workers, 1, 100_000)
+        check_integer("workers", workers, 1, 100_000)
     if workers is not None and name in (None, "serial"):
         raise ConfigError("--workers goes with --engine processes or --engine ray.")
     if address is not None and name != "ray":

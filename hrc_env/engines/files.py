@@ -9,22 +9,22 @@ from hrc_env.core.folders import temporary_cache
 class CarriedFile(str):
     """Path of a file whose content is pickled with it.
 
-    Unpickled it is the path of a file of the same content: the same path where this file exists,
-    else one in a folder of this user's temporary files.
+    When it is unpickled, it becomes the path of a file with the same content: the original path if
+    this file exists there, otherwise a path in the user's temporary folder.
     """
 
     def __reduce__(self) -> tuple[object, tuple[str, bytes]]:
-        """Return the function that restores the path, and the content of the file."""
+        """Return the function that restores the path, and its arguments: path and content."""
         return carried_to, (str(self), Path(self).read_bytes())
 
 
 def carried(name: str) -> str:
-    """Return a name; the file of this name, if it exists, is transferred with it."""
+    """Return the name as a `CarriedFile` if a file of this name exists, otherwise unchanged."""
     return CarriedFile(name) if Path(name).is_file() else name
 
 
 def carried_to(path: str, content: bytes) -> CarriedFile:
-    """Return the path of a file of this content on this machine, written if necessary."""
+    """Return the path of a file with this content on this machine, writing it if necessary."""
     here = Path(path)
     if here.is_file() and here.read_bytes() == content:
         return CarriedFile(path)

@@ -17,23 +17,23 @@ from hrc_env.core.machine import CORES, n_cores
 from hrc_env.engines.engine import Call, Done
 
 ATTEMPTS = 3
-"""Number of attempts at a call whose process died."""
+"""Greatest number of attempts to compute calls if processes die."""
 SINGLE = {CORES: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""Environment variables of a process that computes on one core."""
+"""Environment variables with which a process computes on one core."""
 
 
 @dataclass(frozen=True, slots=True)
 class Serial:
-    """One call after the other, in this process."""
+    """Engine that computes calls one after the other in this process."""
 
     is_parallel = False
 
     def opened(self) -> AbstractContextManager[object]:
-        """As of `Engine`."""
+        """Return a context without effect, because there are no workers."""
         return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls as of `Engine`."""
+        """Compute calls one after the other, as described in `Engine.run`."""
         for k, call in enumerate(calls):
             started_s = time.monotonic()
             result = call(partial(tick, k))
@@ -42,18 +42,18 @@ class Serial:
 
 @dataclass(frozen=True, slots=True)
 class Processes:
-    """Processes on this machine, each of which computes on one core."""
+    """Engine that computes calls in processes on this machine, on one core each."""
 
     workers: int | None = None
     """Number of processes; None: the number of cores."""
     is_parallel = True
 
     def opened(self) -> AbstractContextManager[object]:
-        """As of `Engine`; each run starts processes of its own."""
+        """Return a context without effect, because each run starts new processes."""
         return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls as of `Engine`; unfinished calls of a process that died are repeated."""
+        """Compute calls as described in `Engine.run`, and repeat them if their process dies."""
         left, deaths = dict(enumerate(calls)), 0
         while left:
             try:
@@ -71,7 +71,7 @@ class Processes:
                     ) from error
 
     def _run_once(self, calls: dict[int, Call]) -> Iterator[Done]:
-        """Compute calls with one pool; yield the results that are there before a process dies."""
+        """Compute calls with one pool of processes and yield results until a process dies."""
         n = min(self.workers or n_cores(), len(calls))
         context = multiprocessing.get_context("spawn")
         made = partial(ProcessPoolExecutor, n, mp_context=context, initializer=end_with_parent)
@@ -90,7 +90,7 @@ class Processes:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as its parent has ended, also if that was killed."""
+    """Start a thread that ends this process when its parent process ends, even if killed."""
     parent = multiprocessing.parent_process()
 
     def wait_for_end() -> None:
@@ -111,7 +111,7 @@ class TimedResult(NamedTuple):
 
 
 def call_pickled(call: bytes) -> TimedResult:
-    """Return the result of a pickled call, with its duration."""
+    """Compute a pickled call and return its result and duration."""
     import cloudpickle
 
     started_s = time.monotonic()
@@ -124,7 +124,7 @@ def ignore(share: float) -> None:
 
 
 def pickled(call: Call) -> bytes:
-    """Pickle a call, of a script or a notebook by value."""
+    """Pickle a call; functions from a script or a notebook are pickled by value."""
     import cloudpickle  # takes time to import
 
     return cloudpickle.dumps(call)
@@ -132,7 +132,7 @@ def pickled(call: Call) -> bytes:
 
 @contextmanager
 def _variables(values: dict[str, str]) -> Iterator[None]:
-    """Set environment variables for processes that are started inside."""
+    """Set environment variables for the processes started within this context."""
     before = {name: os.environ.get(name) for name in values}
     os.environ.update(values)
     try:

@@ -1,4 +1,4 @@
-"""Engine `ray`: every call is a task of a cluster."""
+"""The engine `ray`, which computes each call as a task of a Ray cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hrc_env.core.errors import DownloadError, HRCError, RenderingError
-from hrc_env.engines import cluster  # first: it says how Ray is installed where it is missing
+from hrc_env.engines import cluster  # first: its error explains how to install Ray
 from hrc_env.engines.engine import Call, Done
 from hrc_env.engines.local import ATTEMPTS, TimedResult, call_pickled, pickled
 from hrc_env.engines.registrations import Registrations, pack
@@ -17,22 +17,25 @@ from ray.exceptions import RayError, RayTaskError  # isort: skip
 
 @dataclass(frozen=True, slots=True)
 class RayTasks:
-    """Tasks of one core each; Ray restarts tasks whose worker or machine died."""
+    """Engine that computes each call as a Ray task on one core.
+
+    Ray restarts tasks whose worker or machine died.
+    """
 
     workers: int | None = None
-    """Number of calls at a time; None: the number of cores of the cluster."""
+    """Number of calls computed in parallel; None: the number of cores of the cluster."""
     address: str | None = None
-    """Address of the cluster, as of `cluster.connected`."""
+    """Address of the cluster, as in `cluster.connected`."""
     note: Callable[[str], None] = print
-    """Receives notes on the cluster."""
+    """Callback that receives messages about the cluster for the user."""
     is_parallel = True
 
     def opened(self) -> AbstractContextManager[object]:
-        """As of `Engine`: a connection to the cluster."""
+        """Return a context in which this process is connected to the cluster."""
         return cluster.connected(self.address, self.note)
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls as of `Engine`."""
+        """Compute calls on the cluster, as described in `Engine.run`."""
         with cluster.connected(self.address, self.note) as machines:
             cluster.check_machines(machines, None, self.note)
             n = self.workers or int(sum(each.n_cores for each in machines)) or 1
@@ -53,19 +56,19 @@ class RayTasks:
 
 
 def _compute(registrations: Registrations, call: bytes) -> TimedResult:
-    """Return the result of a pickled call, with its duration."""
+    """Compute a pickled call in a worker and return its result and duration."""
     cluster.one_core()
     with cluster.plain_errors():
         registrations.unpack()
         try:
             return call_pickled(call)
-        except (RenderingError, DownloadError) as error:  # of what the machine lacks
+        except (RenderingError, DownloadError) as error:  # something is missing on this machine
             address = ray.util.get_node_ip_address()
             raise type(error)(f"Machine {address} cannot work: {error}") from error
 
 
 def _fetch(answer: Any, k: int) -> TimedResult:
-    """Return the result of a call; an `HRCError` of the call is raised again."""
+    """Return the result of a call, or raise the `HRCError` that the call raised."""
     try:
         return ray.get(answer)
     except RayTaskError as error:

@@ -15,19 +15,19 @@ from hrc_env.registration import IMPORT, adopt, import_files
 
 @dataclass(frozen=True, slots=True)
 class Registrations:
-    """Registrations, and the complete Python files that make them."""
+    """Registrations and the contents of the Python files that make them."""
 
     registered: Snapshot
     sources: Mapping[str, bytes]
-    """Contents of files by their paths here."""
+    """Contents of the files by their paths on the sending machine."""
     imported: tuple[str, ...] = ()
-    """Files of `--import` and of the environment variable `IMPORT`."""
+    """Paths of the files named by `--import` and by the environment variable `IMPORT`."""
 
     def unpack(self) -> None:
-        """Register all of them in this process.
+        """Repeat all registrations in this process.
 
-        Files that are missing here, or differ, are written to a folder of this user and imported
-        from there.
+        Files that are missing on this machine, or that differ, are written to a temporary folder of
+        the user and imported from there.
 
         Raises:
             HRCError: a file cannot be imported, because a package that it imports is not installed.
@@ -36,7 +36,7 @@ class Registrations:
         for path in self.imported:
             try:
                 import_files(here[path])
-            except Exception as error:  # of somebody's file
+            except Exception as error:  # raised by a user's file
                 raise HRCError(
                     f"{path} cannot be imported on this worker ({type(error).__name__}: {error}). "
                     "Only the file itself travels: what it imports must be installed there."

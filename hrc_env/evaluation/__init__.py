@@ -1,1 +1,1 @@
-"""Play agents, summarize their episodes, and give every number its confidence interval."""
+"""Evaluation of agents: episodes, their statistics, and confidence intervals."""

@@ -9,7 +9,7 @@ from hrc_env.core.typing import Bools, Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class Bins:
-    """Edges between the bins of a histogram; the first and the last bin are open."""
+    """Bins of a histogram; the first and the last bin are unbounded."""
 
     edges: Floats
     """Edges (n,) of n + 1 bins, in increasing order."""
@@ -18,8 +18,8 @@ class Bins:
         """Count the values that lie in each bin.
 
         Args:
-            values: (B, ...).
-            mask: values to count, of the same shape (default: all).
+            values: values (B, ...), which are counted per row.
+            mask: mask of the values to count, of the same shape (default: all).
 
         Returns:
             Counts (B, n + 1).
@@ -31,7 +31,7 @@ class Bins:
         return np.bincount(selected, minlength=batch * n_bins).reshape(batch, n_bins)
 
     def quantile(self, counts: Floats | Ints, q: float) -> Floats:
-        """Return a quantile (...,) of counts (..., n + 1), interpolated linearly inside of a bin.
+        """Return the q-quantile (...,) of counts (..., n + 1), interpolated linearly in its bin.
 
         It is NaN if nothing was counted, and infinite if it lies in the last bin.
         """
@@ -54,4 +54,4 @@ ERRORS_M = Bins(np.geomspace(1e-4, 10.0, 240))
 GAPS_M = Bins(np.linspace(-1.0, 2.0, 301))
 """Bins for differences of distances [m]."""
 SPEEDS_MPS = Bins(np.linspace(-3.0, 4.0, 281))
-"""Bins for directed speeds [m/s]."""
+"""Bins for signed speeds [m/s]."""

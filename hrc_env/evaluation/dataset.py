@@ -1,8 +1,9 @@
-"""Data sets of episodes in a folder: one file of arrays per episode, and metadata.
+"""Data sets of episodes in a folder, with one file of arrays per episode and a metadata file.
 
-`dataset.json` holds versions, command, arguments, configuration and cameras; `episode_00000.npz`
-and so on hold the arrays, those of belief and truth as "belief/..." and "truth/...".
-`load_episodes` reads them back, and so do `numpy.load` and `json.load`.
+`dataset.json` contains versions, command, arguments, configuration and cameras.
+`episode_00000.npz` and the following files contain the arrays; the names of those of belief and
+truth begin with "belief/" and "truth/". `load_episodes` reads a folder; `numpy.load` and
+`json.load` read its files.
 """
 
 import json
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, HRCError, whole
+from hrc_env.core.errors import ConfigError, HRCError, check_integer
 from hrc_env.core.records import Keypoints
 from hrc_env.evaluation.moments import PROJECTIONS
 
@@ -28,40 +29,41 @@ Arrays = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Episode:
-    """One recorded episode of T steps, which has T + 1 moments; the first is the reset.
+    """One recorded episode of T steps and T + 1 moments, the first of which is the reset.
 
-    `belief` is the robot's estimate, `truth` the simulator's state: an agent that learns from
+    `belief` is the robot's estimate, and `truth` the simulator's state: an agent that learns from
     `truth` uses information that no robot has. Positions are in the world frame [m].
     """
 
     seed: int
     """Seed of the `reset(seed=seed)` that begins the episode."""
     observations: NDArray[np.float32] | dict[str, NDArray[Any]]
-    """Observations (T + 1, n), or arrays by name if goals or images are separate: "image_<camera>"
-    is (T + 1, H, W, 3) of uint8."""
+    """Observations (T + 1, n), or arrays by name if goals or images are separate; "image_<camera>"
+    is an array (T + 1, H, W, 3) of uint8."""
     actions: NDArray[np.float32]
     """Actions (T, A) in [-1, 1]."""
     rewards: NDArray[np.float64]
     """Rewards (T,)."""
     terminations: NDArray[np.bool_]
-    """Truth values (T,): the step ended the episode."""
+    """Mask (T,) of the step that ended the episode."""
     truncations: NDArray[np.bool_]
-    """Truth values (T,): the step reached the time limit."""
+    """Mask (T,) of the step that reached the time limit."""
     belief: Arrays
-    """Infos of the belief by name, (T + 1, ...), as "reward/proximity" and "perception/...". With
-    poses also "joints_world" (T + 1, W, J, 3) [m], "joints_cov_world" (T + 1, W, J, 3, 3) [m^2],
-    "joints_velocity_world" [m/s], "age_s", "tracked" and "unknown"."""
+    """Infos (T + 1, ...) computed from the belief, by name, such as "reward/proximity" and
+    "perception/...". If poses are recorded, it also contains "joints_world" (T + 1, W, J, 3) [m],
+    "joints_cov_world" (T + 1, W, J, 3, 3) [m^2], "joints_velocity_world" [m/s], "age_s", "tracked"
+    and "unknown"."""
     truth: Arrays
-    """Infos of the truth by name, (T + 1, ...), as "cost" [control steps], "safety/..." and
-    "is_success". With poses also "joints_world" (T + 1, W, J, 3) [m], NaN for workers who are
-    absent, and "present" (T + 1, W)."""
+    """Infos (T + 1, ...) computed from the ground truth, by name, such as "cost" [control steps],
+    "safety/..." and "is_success". If poses are recorded, it also contains "joints_world"
+    (T + 1, W, J, 3) [m], which is NaN for absent workers, and the mask "present" (T + 1, W)."""
     keypoints: Keypoints | None = None
     """Keypoints (T + 1, C, W, J) that the estimator received, in pixels of the projections `P`;
     None if they were not recorded."""
     P: NDArray[np.float64] | None = None
-    """Projections (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels, if
-    keypoints are recorded and rigs are drawn; NaN for a camera that is missing. None: those of
-    `metadata["cameras"]`."""
+    """Projection matrices (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels,
+    if keypoints are recorded and rigs are drawn at random; NaN for missing cameras. If None, the
+    projections of all episodes are in `metadata["cameras"]`."""
 
     def __len__(self) -> int:
         """Return the number of steps T."""
@@ -91,7 +93,7 @@ class EpisodeSet(Sequence[Episode]):
         if isinstance(k, int | np.integer) and not -n <= k < n:  # ends a loop over the set
             raise IndexError(f"There are {n} episodes in {self.path}, got number {k}.")
         return _make_episode(
-            read_arrays(self.path / format_file_name(whole("number", k, -n, n - 1) % n))
+            read_arrays(self.path / format_file_name(check_integer("number", k, -n, n - 1) % n))
         )
 
     def __iter__(self) -> Iterator[Episode]:
@@ -140,7 +142,7 @@ def get_draft_path(path: Path) -> Path:
 
 
 def format_file_name(k: int) -> str:
-    """Return the name of the k-th episode's file."""
+    """Return the file name of the k-th episode."""
     return f"episode_{k:05d}.npz"
 
 
@@ -154,7 +156,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def select_folder(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays named "folder/...", by the rest of their names."""
+    """Return the arrays with names "folder/...", by the rest of their names."""
     return {k[len(folder) + 1 :]: v for k, v in arrays.items() if k.startswith(f"{folder}/")}
 
 

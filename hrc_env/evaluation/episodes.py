@@ -1,4 +1,4 @@
-"""Evaluation of agents: fixed seeds, deterministic actions, cost computed from the truth."""
+"""Evaluation of agents with fixed seeds, deterministic actions and costs from the ground truth."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -11,8 +11,8 @@ import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
-from hrc_env.core.brought import check_arguments, described
-from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.brought import check_arguments, describe
+from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
 from hrc_env.engines.engine import Engine, Tick, engine_called
@@ -27,33 +27,33 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
 
 EVALUATION_SEED = 1_000_000
-"""First seed of evaluations, far from the seeds of training."""
+"""Seed of the first evaluation episode, far from the seeds used in training."""
 TOGETHER = 64
-"""Number of episodes that are played together in a shard."""
+"""Number of episodes in a shard, which are played as one batch."""
 DRAWN_TOGETHER = 4
-"""Number of episodes in a shard at level `pixels`."""
+"""Number of episodes in a shard at the level `pixels`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Means of an agent's statistics over episodes."""
+    """Summary of an agent's episodes."""
 
     episodes: int
     """Number of episodes."""
     success_rate: float
-    """Share of attempts that were achieved (`Task.achieved` and `Task.failed`)."""
+    """Share of attempts that succeeded (`Task.achieved` and `Task.failed`)."""
     is_success: float
-    """Share of episodes that end with `info["is_success"]` of 1."""
+    """Share of episodes that end with an `info["is_success"]` of 1."""
     goals_per_minute: float
-    """Goals reached per minute, of all episodes together [1/min]."""
+    """Goals reached per minute over all episodes [1/min]."""
     contacts_per_episode: float
-    """Contacts with the true worker; a lasting contact counts once."""
+    """Mean number of contacts with the true worker; a lasting contact counts once."""
     cost_per_episode: float
     """Mean sum of `info["cost"]`, which is computed from the truth [control steps]."""
     close_steps_per_episode: float
     """Mean number of steps closer to the true worker than the proximity limit."""
     median_min_separation_m: float
-    """Median over episodes of the least distance to the true worker [m]."""
+    """Median over episodes of the smallest distance to the true worker [m]."""
     return_mean: float
     """Mean sum of rewards."""
 
@@ -68,22 +68,22 @@ def evaluate(
     trust: bool = False,
     **kwargs: Any,
 ) -> Score:
-    """Return the score of an agent over whole episodes with fixed seeds.
+    """Evaluate an agent over whole episodes with fixed seeds and return its score.
 
     Args:
-        make: a function that makes the agent for an `EnvInfo`; or an agent as `make_agent` takes
+        make: function that makes the agent for an `EnvInfo`; or an agent as `make_agent` accepts
             it: a name, a file or "module:function".
-        n_episodes: number of episodes; the k-th begins with `reset(seed=seed + k)`.
+        n_episodes: number of episodes; episode k, from 0, begins with `reset(seed=seed + k)`.
         seed: seed of the first episode.
-        engine: where episodes are played, without effect on the score: "serial", "processes", or
-            "ray" (the cluster that this process is connected to, or one on this machine); None: the
-            fastest on this machine.
-        tick: is called with the share that was completed since the last call.
+        engine: engine that plays the episodes, without effect on the score: "serial", "processes"
+            or "ray" (the cluster to which this process is connected, or one on this machine); None:
+            the fastest on this machine.
+        tick: callback that receives the share of the work completed since its last call.
         trust: whether pickles in a checkpoint may be loaded, as in `make_agent`.
-        kwargs: arguments of the environment, as of `HRCVectorEnv`: task, perception, estimator, ...
+        kwargs: arguments of `HRCVectorEnv`, such as task, perception and estimator.
 
     Raises:
-        ConfigError: the agent or the engine does not exist, or there is no episode.
+        ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
     """
     given = {"engine": engine, "tick": tick, "trust": trust, **kwargs}
     return summarize(evaluate_episodes(make, n_episodes, seed, **given))
@@ -99,9 +99,9 @@ def evaluate_episodes(
     trust: bool = False,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return the statistics of each episode of `evaluate`, in the order of seeds.
+    """Play the episodes of `evaluate` and return the statistics of each, in the order of seeds.
 
-    Two agents on the same seeds are compared pair by pair:
+    To compare two agents on the same seeds, pair by pair:
 
         ours, theirs = (evaluate_episodes(agent, 64) for agent in ("a.zip", "b.zip"))
         compare_means([e["cost"] for e in ours], [e["cost"] for e in theirs])
@@ -110,19 +110,19 @@ def evaluate_episodes(
         make: the agent, as in `evaluate`.
         n_episodes: number of episodes.
         seed: seed of the first episode.
-        engine: where episodes are played, as in `evaluate`.
-        tick: is called with the share that was completed since the last call.
+        engine: engine that plays the episodes, as in `evaluate`.
+        tick: callback that receives the share of the work completed since its last call.
         trust: whether pickles in a checkpoint may be loaded.
         kwargs: arguments of the environment, as in `evaluate`.
 
     Returns:
-        One record per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
-            `success`, `seconds`, ...
+        One dictionary per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
+            `success`, `seconds` and the other `STATISTICS`.
 
     Raises:
-        ConfigError: the agent or the engine does not exist, or there is no episode.
+        ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
     """
-    whole("n_episodes", n_episodes, 1, 10**9)
+    check_integer("n_episodes", n_episodes, 1, 10**9)
     if isinstance(engine, str):
         engine = engine_called(engine)
     if isinstance(make, str):
@@ -145,18 +145,19 @@ def play_shards(
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return the statistics of `play_episodes`, from shards that an engine plays.
+    """Play episodes in shards by an engine and return their statistics, as `play_episodes` does.
 
-    Shards are the same for every engine: sums inside of an agent's network may depend on the number
-    of observations in a batch.
+    Shards are the same for every engine, because the rounding errors of an agent's network may
+    depend on the number of observations in a batch.
 
     Args:
-        make: makes the agent for an `EnvInfo`.
+        make: function that makes the agent for an `EnvInfo`.
         n_episodes: number of episodes.
         seed: seed of the first episode.
-        engine: where shards are played; None: several processes at level pixels, else this one.
-        tick: is called with the share that was completed since the last call.
-        kwargs: as in `play_episodes`.
+        engine: engine that plays the shards; None: several processes at the level `pixels`,
+            otherwise this process.
+        tick: callback that receives the share of the work completed since its last call.
+        kwargs: arguments of the environment, as in `play_episodes`.
     """
     is_drawn = kwargs.get("perception") == "pixels"
     together = DRAWN_TOGETHER if is_drawn else TOGETHER
@@ -186,16 +187,16 @@ def play_episodes(
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return the statistics of whole episodes, each a record by name.
+    """Play whole episodes and return the statistics of each by name.
 
-    The k-th episode begins with `reset(seed=seed + k)` for every agent, so agents and perception
-    levels can be compared episode by episode.
+    Episode k, from 0, begins with `reset(seed=seed + k)` for every agent, so that agents and
+    perception levels can be compared episode by episode.
 
     Args:
-        make: makes the agent for an `EnvInfo`.
+        make: function that makes the agent for an `EnvInfo`.
         n_episodes: number of episodes.
         seed: seed of the first episode.
-        tick: is called with the share that was completed since the last call.
+        tick: callback that receives the share of the work completed since its last call.
         kwargs: arguments of `HRCVectorEnv`; with perception="pixels", which is not batched, those
             of `gymnasium.make`.
     """
@@ -221,7 +222,7 @@ def play_one_by_one(
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return the statistics of `play_episodes`, played in the single environment."""
+    """Play the episodes of `play_episodes` one after the other in a single environment."""
     with closing(gymnasium.make(kwargs.pop("task", DEFAULT), **kwargs)) as env:
         inner: HRCEnv = env.unwrapped  # type: ignore[assignment]  # as every id of ours
         agent, done = _make_agent(make, env_info(inner.simulation)), []
@@ -236,13 +237,11 @@ def play_one_by_one(
 
 
 def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
-    """Return the agent of a factory; raise `ConfigError` for other arguments or results."""
+    """Return the agent that a factory makes; raise `ConfigError` if a signature is wrong."""
     check_arguments("The function that makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):
-        raise ConfigError(
-            f"An agent must have act(observation) -> actions, got {described(agent)}."
-        )
+        raise ConfigError(f"An agent must have act(observation) -> actions, got {describe(agent)}.")
     check_arguments("act", agent.act, "observation")
     return agent
 
@@ -272,7 +271,7 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
 
 
 def describe_contradiction(score: Score) -> str:
-    """Return a warning if most attempts were achieved but no episode succeeded, else ""."""
+    """Return a warning if most attempts were achieved but no episode succeeded, otherwise ""."""
     if score.is_success > 0 or score.success_rate < 0.5:
         return ""
     return (
@@ -284,7 +283,7 @@ def describe_contradiction(score: Score) -> str:
 def measure(episodes: list[dict[str, float]]) -> dict[str, Metric]:
     """Return means over episodes with 95 % intervals.
 
-    Intervals are exact for contacts, and by bootstrap for the others.
+    The interval is exact for contacts, and computed by bootstrap for the other statistics.
     """
     column = {name: [row[name] for row in episodes] for name in episodes[0]}
     minutes = [seconds / 60 for seconds in column["seconds"]]

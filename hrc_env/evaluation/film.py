@@ -24,18 +24,18 @@ from hrc_env.render.frame import MOMENT, Diary, compose
 STEPS_PER_FRAME = 2
 """Control steps per film frame; the film runs in real time."""
 CLOSE_M = 0.1
-"""Distance of a near miss [m]: the still shows the closest moment beyond it."""
+"""Greatest distance of a near miss [m]; the still shows the closest moment that is not one."""
 H264 = ("-preset", "superfast", "-crf", "18")
-"""Encoder options: a fifth of the usual preset's time, and sharp."""
+"""Encoder options for sharp images, which take a fifth of the time of the usual preset."""
 FRAMES_BEHIND = 2
 """Greatest number of frames that wait to be drawn."""
 
 
 class FilmResult(NamedTuple):
-    """The result of a film."""
+    """Totals and still image of a filmed episode."""
 
     totals: dict[str, float]
-    """Totals of the episode by "name [unit]"."""
+    """Totals of the episode by name and unit, as "name [unit]"."""
     still: Image
     """The frame of the closest moment that is not a near miss, or the first frame."""
 
@@ -43,13 +43,14 @@ class FilmResult(NamedTuple):
 def film_episode(
     make: AgentFactory, path: Path, seed: int = 0, n_steps: int | None = None, **kwargs: Any
 ) -> dict[str, float]:
-    """Film an agent's episode in the `HRCEnv` of `kwargs` and return its totals by "name [unit]".
+    """Film one episode of an agent and return its totals by name and unit, as "name [unit]".
 
-    The film ends with the episode, or after `n_steps` (default: the task's time limit). A still of
-    the closest moment that is not a near miss, or of the first moment, is written beside it.
+    The film ends with the episode, or after `n_steps` (default: the task's time limit). A still
+    (.png) of the closest moment that is not a near miss, or of the first moment, is written to the
+    same folder.
 
     Args:
-        make: makes the agent for an `EnvInfo`.
+        make: function that makes the agent for an `EnvInfo`.
         path: the .mp4 file to write.
         seed: seed of the episode.
         n_steps: greatest number of control steps.
@@ -74,9 +75,10 @@ def film_episode(
 def find_nearest_seed(
     make: AgentFactory, seeds: Iterable[int], n_steps: int | None = None, **kwargs: Any
 ) -> int:
-    """Return the seed of the episode that comes closest to the worker without a near miss.
+    """Return the seed of the episode in which the robot comes closest without a near miss.
 
-    Nothing is drawn: "pixels" is played as "keypoints", so the film's episode may differ.
+    No images are rendered: the level "pixels" is replaced by "keypoints", so that the episode in
+    the film may differ.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
@@ -87,7 +89,7 @@ def find_nearest_seed(
     free = [seed for seed, distance_m in closest_m.items() if distance_m > CLOSE_M]
     if free:
         return min(free, key=closest_m.__getitem__)
-    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least one
+    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least close
 
 
 def begin_episode(env: Any, make: AgentFactory, seed: int, n_steps: int) -> Iterator[Transition]:
@@ -106,7 +108,7 @@ def _find_closest_m(env: HRCEnv, make: AgentFactory, seed: int, n_steps: int) ->
 
 
 def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) -> FilmResult:
-    """Play an episode, while a thread draws and encodes every second step."""
+    """Play an episode while a thread draws and encodes every second step."""
     steps, waiting = begin_episode(env, make, seed, n_steps), deque[Future[Image]]()
     writer: Any = imageio.get_writer(
         path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME,

@@ -1,8 +1,8 @@
-"""Metrics with 95 % intervals, by bootstrap over seeds, as the frames of a seed are dependent.
+"""Metrics with 95 % intervals, by bootstrap over seeds because frames of a seed are dependent.
 
 Rows that share their seeds are compared seed by seed (`compare_paired`). Rates of rare events and
-shares of trials have exact intervals (`estimate_rate`, `estimate_share`): a bootstrap of zeros has
-no width, as if an event that did not happen could not happen.
+shares of trials have exact intervals (`estimate_rate`, `estimate_share`), because a bootstrap
+interval of zeros has no width, as if an event that was not observed were impossible.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -22,8 +22,8 @@ from hrc_env.evaluation.counts import Bins
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
-"""A function from the number of times that each seed is drawn (R, n) to a value for each draw
-(R,)."""
+"""Function of the number of times (R, n) that each of n seeds is drawn in R bootstrap draws, which
+returns a value (R,) per draw."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,24 +33,24 @@ class Comparison:
     difference: Metric
     """Difference with its 95 % interval."""
     p: float
-    """Two-sided probability of a difference at least that large if there were none; NaN if
-    undefined."""
+    """Two-sided p-value, the probability of a difference at least this large if there were none;
+    NaN if undefined."""
 
 
 def compare_means(ours: Numbers, theirs: Numbers, unit: str = "1") -> Comparison:
-    """Return the difference of two means over the same seeds, pair by pair.
+    """Return the difference of two means over the same seeds, compared pair by pair.
 
-    The interval is a bootstrap over pairs; p is from exchanging the two of a pair at random (Fisher
-    1935), and can fall below .05 with 6 pairs or more. Pairs with a number that is not finite do
-    not count.
+    The interval is computed by bootstrap over pairs. The p-value is that of a permutation test that
+    swaps the two numbers of a pair at random (Fisher 1935); it can fall below .05 with 6 pairs or
+    more. Pairs with a number that is not finite are ignored.
 
     Args:
-        ours: (n,) one number per seed.
-        theirs: (n,) numbers to compare with, for the same seeds in the same order.
-        unit: unit of both.
+        ours: numbers (n,), one per seed.
+        theirs: numbers (n,) to compare with, for the same seeds in the same order.
+        unit: unit of the numbers.
 
     Raises:
-        ConfigError: these are not two columns of one length.
+        ConfigError: the numbers are not two one-dimensional arrays of the same length.
     """
     x, y = _check_column("ours", ours), _check_column("theirs", theirs)
     if len(x) != len(y):
@@ -70,22 +70,22 @@ def compare_rates(
     their_exposure: Numbers | float,
     unit: str = "1",
 ) -> Comparison:
-    """Return the difference of two rates of rare events, from exact intervals.
+    """Return the difference of two rates of rare events, with its 95 % interval and p-value.
 
-    The interval follows from those of both rates (`estimate_rate`; Zou and Donner 2008,
-    doi:10.1002/sim.3095), also if there was no event at all. The p-value is exact, from the
-    distribution of the events over both (Przyborowski and Wilenski 1940,
+    The interval is computed from the exact intervals of both rates (`estimate_rate`; Zou and Donner
+    2008, doi:10.1002/sim.3095), even if no event was observed. The p-value is exact, from the
+    distribution of the events over the two rows (Przyborowski and Wilenski 1940,
     doi:10.1093/biomet/31.3-4.313).
 
     Args:
-        ours: (n,) number of events per seed.
-        theirs: (m,) number of events per seed to compare with.
+        ours: number of events (n,) per seed.
+        theirs: number of events (m,) per seed to compare with.
         our_exposure: exposure of `ours`, per seed or in total.
         their_exposure: exposure of `theirs`, per seed or in total.
-        unit: unit of an event per exposure.
+        unit: unit of the rates.
 
     Raises:
-        ConfigError: counts are not whole numbers, or an exposure is below 0.
+        ConfigError: counts are not whole numbers, or an exposure is negative.
     """
     difference = subtract_rates(
         estimate_rate(ours, our_exposure, unit), estimate_rate(theirs, their_exposure, unit)
@@ -99,9 +99,9 @@ def compare_rates(
 
 
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
-    """Return a statistic of n seeds with its percentile interval.
+    """Return a statistic of n seeds with its 95 % percentile interval.
 
-    Draws without a value do not count.
+    Draws for which the statistic is undefined are ignored.
     """
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
@@ -120,7 +120,7 @@ def compare_paired(
 ) -> Metrics:
     """Return the difference of a statistic between two rows with the same seeds.
 
-    With one number per seed, `ours` and `theirs` (n,), the difference of the means, as by
+    For example, the difference of the means of `ours` and `theirs` (n,), one number per seed, as in
     `compare_means`:
 
         both = np.array([*ours, *theirs])
@@ -128,17 +128,17 @@ def compare_paired(
 
     Args:
         name: name of the statistic.
-        statistic: of one row, not of the difference. It takes weights (R, 2n), the number of times
-            that each seed counts, of ours and then of theirs; for the statistic of ours those of
-            theirs are 0.
+        statistic: statistic of one row, not of the difference. It takes weights (R, 2n), the number
+            of times that each seed counts, first for our row and then for theirs. For the statistic
+            of our row, the weights of theirs are 0.
         n: number of seeds of a row.
         unit: unit of the statistic.
         n_draws: number of draws of seeds.
 
     Returns:
-        "difference.NAME" with its 95 % interval over draws of whole pairs; and "p.NAME", two-sided,
-            from exchanging the rows of each pair at random (Fisher 1935), below .05 with 6 seeds or
-            more.
+        "difference.NAME", with its 95 % interval over draws of whole pairs, and "p.NAME", the
+            two-sided p-value of a permutation test that swaps the rows of each pair at random
+            (Fisher 1935), which can fall below .05 with 6 seeds or more.
     """
 
     def subtract(ours: Ints, theirs: Ints) -> Floats:
@@ -153,18 +153,18 @@ def compare_paired(
 
 
 def make_ratio(above: Numbers, below: Numbers) -> Statistic:
-    """Return the statistic "sum of one number per seed over the sum of another"."""
+    """Return a statistic that divides the sum of one number per seed by the sum of another."""
     x, y = np.asarray(above, float), np.asarray(below, float)
     return lambda weights: (weights @ x) / (weights @ y)
 
 
 def make_rmse(squared: Numbers, counts: Numbers) -> Statistic:
-    """Return the statistic "root mean square", from a sum of squares and a count per seed."""
+    """Return a statistic that computes a root mean square, from sums of squares and counts."""
     return lambda weights: np.sqrt(make_ratio(squared, counts)(weights))
 
 
 def make_quantile(values: Sequence[Numbers], q: float) -> Statistic:
-    """Return the statistic "quantile of all values of all seeds together"."""
+    """Return a statistic that computes a quantile of the values of all seeds together."""
     owner = np.repeat(np.arange(len(values)), [len(each) for each in values])
     together = np.concatenate([*values, []])
 
@@ -176,18 +176,18 @@ def make_quantile(values: Sequence[Numbers], q: float) -> Statistic:
 
 
 def make_binned_quantile(bins: Bins, counts: Any, q: float) -> Statistic:
-    """Return the statistic "quantile of counts" (n, bins), one row per seed.
+    """Return a statistic that computes a quantile of histograms `counts` (n, bins), one per seed.
 
-    Values beyond the last edge count as that edge.
+    A quantile beyond the last edge is replaced by that edge.
     """
     rows, most = np.asarray(counts, float), bins.edges[-1]
     return lambda weights: np.minimum(bins.quantile(weights @ rows, q), most)
 
 
 def estimate_ratio(above: Numbers, below: Numbers, unit: str) -> Metric:
-    """Return the sum of one number per seed over the sum of another.
+    """Return the sum of one number per seed, divided by the sum of another, with its interval.
 
-    This is a rate, a share or a ratio of rows.
+    The result is a rate, a share or the ratio of two rows.
     """
     x, y = _keep_finite(above, below)
     return bootstrap(make_ratio(x, y), len(x), unit)
@@ -196,22 +196,22 @@ def estimate_ratio(above: Numbers, below: Numbers, unit: str) -> Metric:
 def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metric:
     """Return the rate of a rare event, with its exact 95 % interval.
 
-    The interval of a Poisson count bounds the rate also of an event that did not happen (Garwood
-    1936, doi:10.2307/2333958).
+    It is the interval of a Poisson count, which bounds the rate even if no event was observed
+    (Garwood 1936, doi:10.2307/2333958).
 
     Args:
-        counts: (n,) number of events per seed.
+        counts: number of events (n,) per seed.
         exposure: the time, distance or number of trials observed, per seed (n,) or in total.
-        unit: unit of an event per exposure.
+        unit: unit of the rate.
 
     Raises:
-        ConfigError: counts are not whole numbers, or an exposure is below 0.
+        ConfigError: counts are not whole numbers, or an exposure is negative.
     """
     events = _check_column("counts", counts)
     if not (np.isfinite(events).all() and (events >= 0).all() and (events % 1 == 0).all()):
         raise ConfigError(
             "counts must be whole numbers from 0 on, one per seed; estimate_mean takes other "
-            f"numbers; got {described(counts)}."
+            f"numbers; got {describe(counts)}."
         )
     if np.ndim(exposure) and len(_check_column("exposure", exposure)) != len(events):
         raise ConfigError(
@@ -219,7 +219,7 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
             f"{np.size(exposure)} numbers; a single number is the exposure of all seeds."
         )
     if not np.all(np.asarray(exposure, float) >= 0):
-        raise ConfigError(f"exposure must not be negative, got {described(exposure)}.")
+        raise ConfigError(f"exposure must not be negative, got {describe(exposure)}.")
     total, over = float(np.sum(counts)), float(np.sum(exposure))
     if not over:
         return Metric(np.nan, np.nan, np.nan, unit, len(counts))
@@ -233,18 +233,18 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
 def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
     """Return the share of trials with a true outcome, with its exact 95 % interval.
 
-    The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); the share of
-    no trials is NaN.
+    The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404). Without
+    trials, the share is NaN.
 
     Args:
-        outcomes: (n,) truth values.
+        outcomes: truth values (n,), one per trial.
 
     Raises:
-        ConfigError: outcomes are not a column of truth values.
+        ConfigError: outcomes are not a one-dimensional array of truth values.
     """
     column = _check_column("outcomes", outcomes)
     if not np.isin(column, (0.0, 1.0)).all():
-        raise ConfigError(f"outcomes must be true or false per trial, got {described(outcomes)}.")
+        raise ConfigError(f"outcomes must be true or false per trial, got {describe(outcomes)}.")
     n, n_true = len(column), int(column.sum())
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
@@ -255,9 +255,9 @@ def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
 def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
     """Return goals per minute with an interval.
 
-    The interval is by bootstrap if any goal was reached, else exact.
-
-    Goals are more regular than a Poisson process, so the bootstrap's interval is narrower.
+    The interval is computed by bootstrap if any goal was reached, and is otherwise exact. Goals are
+    reached more regularly than events of a Poisson process occur, so that the bootstrap interval is
+    narrower than the exact one.
     """
     return (estimate_ratio if np.any(goals) else estimate_rate)(goals, minutes, "1/min")
 
@@ -265,8 +265,8 @@ def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
 def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
     """Return the share of attempts that succeeded, with a bootstrap interval.
 
-    If all or none did, the interval is the exact one of as many trials as there are seeds, because
-    attempts with one seed are alike.
+    If all or none succeeded, the interval is the exact one of as many trials as there are seeds,
+    because attempts with the same seed are dependent.
     """
     share = estimate_ratio(achieved, tries, "1")
     if share.value not in (0.0, 1.0):
@@ -276,9 +276,9 @@ def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
 
 
 def subtract_rates(ours: Metric, theirs: Metric) -> Metric:
-    """Return the difference of two rates, with the interval that follows from both of theirs.
+    """Return the difference of two rates, with an interval computed from their intervals.
 
-    The interval (Zou and Donner 2008, doi:10.1002/sim.3095) has a width also if both rates are 0.
+    The interval (Zou and Donner 2008, doi:10.1002/sim.3095) has a width even if both rates are 0.
     """
     difference = ours.value - theirs.value
     low = difference - np.hypot(ours.value - ours.low, theirs.high - theirs.value)
@@ -289,27 +289,30 @@ def subtract_rates(ours: Metric, theirs: Metric) -> Metric:
 def estimate_mean(values: Numbers, unit: str = "1") -> Metric:
     """Return the mean of one number per seed with its 95 % bootstrap interval.
 
-    Seeds without a finite number do not count; `Metric.n` is the number of those that do.
+    Seeds without a finite number are ignored; `Metric.n` is the number of the others.
 
     Args:
-        values: (n,) one number per seed.
+        values: numbers (n,), one per seed.
         unit: unit of the numbers.
 
     Raises:
-        ConfigError: values are not a column of numbers.
+        ConfigError: values are not a one-dimensional array of numbers.
     """
     values = _check_column("values", values)
     return estimate_ratio(values, np.ones(len(values)), unit)
 
 
 def estimate_rmse(squared: Numbers, counts: Numbers, unit: str) -> Metric:
-    """Return the root mean square from a sum of squares and a count per seed, or a ratio of two."""
+    """Return a root mean square with its interval, from a sum of squares and a count per seed.
+
+    With the sums of squares of two rows instead, it is the ratio of their root mean squares.
+    """
     x, y = _keep_finite(squared, counts)
     return bootstrap(make_rmse(x, y), len(x), unit)
 
 
 def estimate_iqm(values: Numbers, unit: str) -> Metric:
-    """Return the mean of the middle half of the seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
+    """Return the interquartile mean over seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
     (x,) = _keep_finite(values)
 
     def iqm(weights: Ints) -> Floats:
@@ -320,24 +323,24 @@ def estimate_iqm(values: Numbers, unit: str) -> Metric:
 
 
 def estimate_quantile(values: Sequence[Numbers], q: float, unit: str) -> Metric:
-    """Return a quantile of all values of all seeds together; its n is the number of values."""
+    """Return a quantile of the values of all seeds together; `Metric.n` is the number of values."""
     groups = [_keep_finite(each)[0] for each in values]
     metric = bootstrap(make_quantile(groups, q), len(groups), unit, 400)
     return replace(metric, n=sum(group.size for group in groups))
 
 
 def estimate_binned_quantile(bins: Bins, counts: Any, q: float, unit: str) -> Metric:
-    """Return a quantile of counts (n, bins), one row per seed."""
+    """Return a quantile of histograms `counts` (n, bins), one per seed, with its interval."""
     return bootstrap(make_binned_quantile(bins, counts, q), len(counts), unit, 1000)
 
 
 def find_crossing(x: Floats, y: Floats, level: float) -> float:
-    """Return the x at which falling values y first reach a level.
+    """Return the x at which decreasing values y first reach a level.
 
     Args:
-        x: (n,) increasing.
-        y: (n,) values at x, between which they are interpolated linearly.
-        level: the level; if it is never reached, the last x is returned.
+        x: increasing coordinates (n,).
+        y: values (n,) at x, interpolated linearly between them.
+        level: level to reach; if y never reaches it, the last x is returned.
     """
     reached = np.flatnonzero(y <= level)
     if not reached.size or reached[0] == 0:
@@ -347,18 +350,18 @@ def find_crossing(x: Floats, y: Floats, level: float) -> float:
 
 
 def _check_column(name: str, values: Any) -> Floats:
-    """Return values as numbers (n,); raise `ConfigError` if they are not."""
+    """Return values as an array (n,) of numbers; raise `ConfigError` if they are not numbers."""
     try:
         column = np.asarray(values, float)
     except (TypeError, ValueError) as error:
-        raise ConfigError(f"{name} must be numbers, got {described(values)}: {error}.") from error
+        raise ConfigError(f"{name} must be numbers, got {describe(values)}: {error}.") from error
     if column.ndim != 1:
         raise ConfigError(f"{name} must have shape (n,), one number per seed, got {column.shape}.")
     return column
 
 
 def _keep_finite(*samples: Numbers) -> list[Floats]:
-    """Return samples (n,) of the seeds for which every number is finite."""
+    """Return the samples without the seeds for which any of the numbers is not finite."""
     arrays = [np.asarray(each, float) for each in samples]
     finite = np.all(np.isfinite(arrays), axis=0)
     return [each[finite] for each in arrays]
@@ -366,5 +369,5 @@ def _keep_finite(*samples: Numbers) -> list[Floats]:
 
 @lru_cache(maxsize=8)
 def draw_seeds(n: int, n_draws: int, stream: int = 0) -> Ints:
-    """Return the number of times that each seed is drawn (R, n), always the same for a stream."""
+    """Return the number of times (R, n) that each seed is drawn, reproducible for each stream."""
     return np.random.default_rng(stream).multinomial(n, np.full(n, 1 / n), n_draws)

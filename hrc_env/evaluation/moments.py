@@ -1,4 +1,4 @@
-"""Arrays of each moment of recorded episodes: selected infos, poses and keypoints."""
+"""Arrays that are recorded at each moment of an episode: selected infos, poses and keypoints."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import worker_truth
 
 PROJECTIONS = "P"
-"""Name of the projections beside keypoints, for rigs that are drawn in every episode."""
+"""Name of the projection matrices, recorded with keypoints if every episode draws a new rig."""
 Moment = dict[str, NDArray[Any]]
-"""Arrays (B, ...) by name; those of belief and truth begin with "belief/" and "truth/"."""
+"""Arrays (B, ...) by name; names from belief and truth begin with "belief/" and "truth/"."""
 
 
 @dataclass(frozen=True, slots=True)
 class MomentParts:
-    """The parts of a moment that are recorded."""
+    """Selection of the parts of a moment to record."""
 
     infos: tuple[str, ...] = ()
     """Names of the infos to record."""
@@ -31,11 +31,11 @@ class MomentParts:
     """Whether to record the keypoints that the estimator receives."""
 
     def read(self, env: HRCVectorEnv, info: Mapping[str, Any]) -> Moment:
-        """Return the present moment of every environment.
+        """Return the arrays of the current moment of every environment.
 
         Args:
             env: the environments.
-            info: the infos of their last step or reset.
+            info: the infos of the environments' last step or reset.
         """
         moment = {add_folder(name): np.array(info[name]) for name in self.infos}
         parts = [dict(self._read_part(part)) for part in env.shards.parts]
@@ -56,7 +56,7 @@ class MomentParts:
 
 
 def add_folder(name: str) -> str:
-    """Return the name of an info with its folder, "belief/" or "truth/"."""
+    """Return the name of an info with the prefix "belief/" or "truth/"."""
     return f"{'belief' if is_of_belief(name) else 'truth'}/{name}"
 
 

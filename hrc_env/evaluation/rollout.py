@@ -1,4 +1,4 @@
-"""The loop of an agent and its environment."""
+"""The interaction loop of an agent and its environment."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,21 +11,21 @@ from hrc_env.core.typing import Bools
 
 
 class Steppable(Protocol):
-    """An environment, or a batch of them, with the `step` of Gymnasium."""
+    """Interface of an environment, or a batch of environments, with Gymnasium's `step`."""
 
     def step(self, action: Any, /) -> tuple[Any, Any, Any, Any, Mapping[str, Any]]:
-        """Return observation, reward, terminated, truncated and info after an action."""
+        """Take an action and return observation, reward, terminated, truncated and info."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One control step of an environment, or of a batch, with arrays that begin with (B,)."""
+    """One control step of an environment, or of a batch of B environments."""
 
     action: Any
-    """Action of the agent (..., A)."""
+    """Action (..., A) of the agent."""
     observation: Observation
-    """Observation after the step (..., n)."""
+    """Observation (..., n) after the step."""
     reward: Any
     """Reward of the step, a number or (B,)."""
     terminated: Any
@@ -35,11 +35,11 @@ class Transition:
     info: Mapping[str, Any]
     """Infos of the step (docs/reference/infos.md)."""
     is_playing: Bools
-    """Whether the step belongs to the first episode, () for a single environment or (B,)."""
+    """Whether the step belongs to the first episode, () or (B,)."""
 
     @property
     def ends(self) -> Bools:
-        """Whether the first episode ends with this step, (B,) or ()."""
+        """Whether the first episode ends with this step, () or (B,)."""
         return self.is_playing & np.asarray(np.logical_or(self.terminated, self.truncated))
 
 
@@ -53,12 +53,12 @@ def rollout(
 
     Args:
         env: a Gymnasium environment, a vector environment, or any object with their `step`.
-        agent: its actions are passed to `env` as they are.
+        agent: the agent; its actions are passed to `env` unchanged.
         observation: the observation that `env.reset` returned.
-        n_steps: greatest number of steps (default: no limit but the environment's own).
+        n_steps: greatest number of steps (default: limited only by the environment).
 
     Yields:
-        Each step as soon as it was made.
+        The transition of each step, as soon as the step is taken.
     """
     is_playing, step = None, 0
     while (is_playing is None or is_playing.any()) and step != n_steps:

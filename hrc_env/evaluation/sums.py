@@ -14,9 +14,9 @@ COSTS = ("cost", "cost_proximity", "cost_contact")
 SUMS = np.dtype(
     [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
 )
-"""Sums of the current episode; a lasting contact counts once."""
+"""Data type of the sums over the current episode; a lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
-"""Names of an episode's numbers of achieved and failed attempts (`Task.achieved`,
+"""Names of the statistics that count an episode's achieved and failed attempts (`Task.achieved`,
 `Task.failed`)."""
 
 STATISTICS = (
@@ -30,7 +30,7 @@ UNITS = {
     "cost": COST_UNIT, "cost_steps": COST_UNIT, "l": "control steps", "seconds": "s",
     "min_separation_m": "m",
 }  # fmt: skip
-"""Units of statistics by name; those that are missing here are numbers, of unit "1"."""
+"""Units of statistics by name; all other statistics have the unit "1"."""
 
 
 class EpisodeSums:
@@ -46,7 +46,7 @@ class EpisodeSums:
         self.sums["nearest_m"][ids] = np.inf
 
     def add(self, reward: Floats, infos: Mapping[str, Any]) -> Floats:
-        """Add one step of all environments and return its cost (num_envs,).
+        """Add one step of all environments and return the costs (num_envs,) of the step.
 
         Args:
             reward: rewards (num_envs,).
@@ -68,13 +68,13 @@ class EpisodeSums:
     def summarize(
         self, b: int, info: Mapping[str, Any], task: Task, ctrl_dt_s: float
     ) -> dict[str, float]:
-        """Return the statistics of the episode of environment `b` by name.
+        """Return the statistics of the current episode of environment `b` by name.
 
         Args:
             b: index of the environment.
             info: the last info of the episode.
             task: the environment's task.
-            ctrl_dt_s: the control step [s].
+            ctrl_dt_s: duration of a control step [s].
         """
         episode = self.sums[b]
         return {
@@ -93,9 +93,9 @@ class EpisodeSums:
 
 
 def read_step_value(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
-    """Return an info of the step itself (num_envs,), NaN if there is none.
+    """Return the values (num_envs,) of an info for the last step, NaN where it is missing.
 
-    If an episode ended with the step, it is read from its final info.
+    If the step ended an episode, the value is read from the final info of that episode.
     """
     value = np.full(num_envs, np.nan)
     for part in (infos, infos.get("final_info", {})):

@@ -1,4 +1,4 @@
-"""The agents of a study: their check, their description in results, and their factory."""
+"""Checks, descriptions, labels and factories of the agents of a study."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,11 +9,11 @@ from typing import Any
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import AgentFactory
 from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, find_function, make_agent
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.experiments.versions import hash_file, hash_source
 
 AgentChoice = str | AgentFactory
-"""An agent as `hrc_env.make_agent` takes it, or a function that makes an agent."""
+"""An agent as `hrc_env.make_agent` accepts it, or a function that makes an agent."""
 
 
 def check_choice(agent: AgentChoice) -> None:
@@ -25,7 +25,7 @@ def check_choice(agent: AgentChoice) -> None:
         ".zip", policies.SUFFIX
     )  # fmt: skip
     if is_file and not Path(agent).is_file():
-        raise ConfigError(f"{unknown('agent', agent, AGENTS)} Or {OTHERS}.")
+        raise ConfigError(f"{make_unknown_name_error('agent', agent, AGENTS)} Or {OTHERS}.")
 
 
 def get_agent_factory(agent: AgentChoice, trust: bool = False) -> AgentFactory:
@@ -34,10 +34,10 @@ def get_agent_factory(agent: AgentChoice, trust: bool = False) -> AgentFactory:
 
 
 def describe_agent(agent: AgentChoice) -> Any:
-    """Return the description of an agent that keys the parts of a study, for JSON.
+    """Return a JSON description of an agent for the keys of a study's parts.
 
-    This is its name; for a file its digest; for a user's function its name and the digest of its
-    file.
+    It is the agent's name, the digest of the agent's file, or, for a user's function, the name of
+    the function and the digest of its source file.
     """
     if not isinstance(agent, str):
         name = getattr(agent, "__qualname__", type(agent).__qualname__)
@@ -52,11 +52,11 @@ def describe_agent(agent: AgentChoice) -> Any:
 
 
 def label_agents(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, str]:
-    """Return agents by labels that are valid in names of files and results, in their order.
+    """Return agents, in their order, by labels that are valid in names of files and results.
 
     Args:
-        agents: agents as `hrc_env.make_agent` takes them; repetitions count once.
-        taken: labels that the study gives to its own agents.
+        agents: agents as `hrc_env.make_agent` accepts them; repetitions count once.
+        taken: labels of the study's built-in agents.
 
     Raises:
         ConfigError: two agents get the same label.
@@ -74,7 +74,7 @@ def label_agents(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, s
 
 
 def label_agent(agent: str, taken: Mapping[str, str]) -> str:
-    """Return a label for a user's agent: its letters, digits and _, joined by -."""
+    """Return a label for a user's agent, in which - replaces all but letters, digits and _."""
     stem = agent.removesuffix(".zip").removesuffix(policies.SUFFIX)
     label = re.sub(r"\W+", "-", stem).strip("-")
     return f"own-{label}" if label in taken else label

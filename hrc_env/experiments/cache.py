@@ -1,4 +1,4 @@
-"""The folder of a study: its owner, and the finished parts from which a stopped run continues."""
+"""The folder of a study, with the finished parts from which a stopped run continues."""
 
 import json
 import os
@@ -17,12 +17,12 @@ from hrc_env.engines.engine import Done, Engine
 from hrc_env.engines.local import Processes, Serial
 
 Progress = Callable[[float, str], None]
-"""Callback that takes the growth of the completed share, and a label of the current part.
+"""Callback that receives the increase of the completed share and the label of the current part.
 
 Shares sum to 1.
 """
 PartProgress = Callable[[float], None]
-"""Callback that takes the growth of the completed share of a part."""
+"""Callback that receives the increase of the completed share of a part."""
 LABEL = "experiment.json"
 """Name of the file that identifies the study of a folder."""
 _MAX_DIFFERENCES = 3
@@ -31,17 +31,17 @@ _MAX_DIFFERENCES = 3
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A unit of work of a study, which is computed at once and stored."""
+    """A unit of work of a study, with a result that is stored in a file."""
 
     label: str
     """Name of the part and of its file."""
     make: Callable[[PartProgress], dict[str, Any]]
-    """Computes the part and reports its progress; it can be pickled for engines in other
-    processes."""
+    """Function that computes the part and reports its progress. For engines that use other
+    processes, it must be picklable."""
     key: str | None = None
-    """Key of the part's inputs; None: that of the cache."""
+    """Key of the part's inputs; None: the key of the cache."""
     notes: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that are stored beside the part, if its label alone does not suffice to compute it
+    """Numbers that are stored with the part, if its label alone does not suffice to compute it
     again."""
     weight: float = 1.0
     """Weight of the part in the progress; the weights of a study sum to its `n_parts`."""
@@ -49,16 +49,16 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class PartCache:
-    """Finished parts, each a JSON file with the key of its inputs."""
+    """Cache of finished parts, each of which is a JSON file with the key of its inputs."""
 
     folder: Path
     key: str
-    """Key of parts without one of their own (`versions.make_key`)."""
+    """Key of parts with a `Part.key` of None (`versions.make_key`)."""
     n_parts: float
     """Total weight of the study's parts."""
     progress: Progress
     engine: Engine | None = field(default=None, kw_only=True)
-    """Where parts are computed; None: the fastest on this machine."""
+    """Engine that computes missing parts; None: the fastest on this machine."""
 
     def make_part(
         self,
@@ -67,13 +67,13 @@ class PartCache:
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Return a part from its file if the key is the same, else compute it in this process.
+        """Return a part from its file if the key matches; otherwise compute it in this process.
 
         Args:
             label: name of the part.
-            make: computes the part, as in `Part`.
+            make: function that computes the part, as in `Part`.
             key: key of the part, as in `Part`.
-            notes: numbers to store beside the part, as in `Part`.
+            notes: numbers to store with the part, as in `Part`.
         """
         return self._make_parts([Part(label, make, key, notes or {})], Serial())[0]
 
@@ -84,8 +84,8 @@ class PartCache:
 
         Args:
             parts: parts that do not depend on each other.
-            one_core: whether computing a part keeps only one core busy; if no engine is chosen,
-                several processes then compute them.
+            one_core: whether the computation of a part uses only one core; if no engine is chosen,
+                several processes then compute the parts.
         """
         engine = self.engine or (Processes() if one_core and n_cores() > 1 else Serial())
         return self._make_parts(parts, engine)
@@ -129,20 +129,20 @@ class PartCache:
             return None
         if content.get("key") != (part.key or self.key):
             return None
-        os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))  # used, not made, now
+        os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))  # last use
         return content["part"]
 
 
 def claim_folder(
     out: Path, name: str, overwrite: bool = False, settings: Mapping[str, Any] | None = None
 ) -> None:
-    """Make `out` the folder of a study.
+    """Mark `out` as the folder of a study.
 
     Args:
         out: the folder. Finished parts of an earlier run with the same settings are kept.
         name: name of the study.
-        overwrite: whether to delete other results; parts of the same study are kept, as each has
-            the key of its settings.
+        overwrite: whether to delete results of other studies or settings. Parts of the same study
+            are kept, because each contains the key of its settings.
         settings: all settings that the numbers depend on; None if unknown.
 
     Raises:
@@ -171,16 +171,16 @@ def claim_folder(
 
 
 def release_folder(out: Path) -> None:
-    """Let a study with any settings continue in a folder and use its parts of equal keys."""
+    """Remove a folder's mark, so that a study with any settings can use it and its parts."""
     for each in (LABEL, "results.json"):
         (out / each).unlink(missing_ok=True)
 
 
 def _normalize(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings in the form that JSON gives them, without digests of source files.
+    """Return settings as JSON stores them, without digests of source files.
 
-    After a change of code a study continues in the same folder, and parts that depend on the code
-    are computed again.
+    After a change of code, a study can therefore continue in the same folder, and only the parts
+    that depend on the code are computed again.
     """
 
     def strip(value: Any) -> Any:
@@ -192,11 +192,11 @@ def _normalize(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _read_settings(out: Path) -> dict[str, Any] | None:
-    """Return the settings with which a folder's study began; None if unknown."""
+    """Return the settings of the study that owns a folder, or None if they are unknown."""
     label, results = out / LABEL, out / "results.json"
     content = json.loads(label.read_text()) if label.exists() else {}
     found = content.get("settings")
-    if found is None and results.exists():  # of an earlier version
+    if found is None and results.exists():  # written by an earlier version
         with suppress(json.JSONDecodeError, KeyError):
             found = json.loads(results.read_text())["config"]
             found.pop("experiment", None)
@@ -223,7 +223,7 @@ def _shorten(value: Any) -> str:
 
 
 def read_owner(out: Path) -> str | None:
-    """Return the name of the study that owns a folder; None if it has none."""
+    """Return the name of the study that owns a folder, or None if no study does."""
     for path in (out / LABEL, out / "results.json"):
         if path.exists():
             try:

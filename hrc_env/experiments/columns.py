@@ -21,7 +21,7 @@ Episodes = Sequence[Mapping[str, float]]
 Key = str | tuple[str, ...]
 """Key of a row, which replaces `{}`, or `{0}` and `{1}`, in the names of its metrics."""
 Measure = Callable[[Episodes, Episodes], Metric]
-"""A function from a row's episodes, and those of its baseline on the same seeds, to a metric."""
+"""Function that computes a metric from a row's episodes and its baseline's on the same seeds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,24 +38,24 @@ class Column:
     scale: float = 1.0
     """Factor from the metric's unit to the heading's."""
     signed: bool = False
-    """Whether it is a difference, which is shown with its sign."""
+    """Whether the metric is a difference, which is shown with its sign."""
     marked: bool = True
-    """Whether a difference gets a dot if its interval excludes zero."""
+    """Whether a difference is marked with a dot if its interval excludes zero."""
     counted: bool = False
-    """Whether it counts rare events, so that its interval is always shown."""
+    """Whether the metric counts rare events, so that its interval is always shown."""
     plain: bool = False
-    """Whether its interval is never shown."""
+    """Whether the interval is never shown."""
     shows: Literal["value", "n", "count"] = "value"
-    """The number to show: the value; the number of observations; or a share as "8 of 9"."""
+    """Number to show: the value, the number of observations, or a share in the form "8 of 9"."""
     beside: str = ""
-    """Name of another metric; its value follows in brackets in place of an interval."""
+    """Name of another metric; its value is shown in brackets instead of an interval."""
     measure: Measure | None = None
-    """Computes the metric; None: the study or another column computes it."""
+    """Function that computes the metric; None: the study or another column computes it."""
     is_paired: bool = False
     """Whether `measure` compares the row with its baseline."""
 
     def list_metrics(self, row: Key) -> list[str]:
-        """Return the metrics of a row: that of the column, and the one beside it.
+        """Return the names of a row's metrics: that of the column and, if any, `beside`.
 
         Args:
             row: key of the row.
@@ -65,7 +65,7 @@ class Column:
 
 
 class Shown(TypedDict, total=False):
-    """Format of a column: fields of `Column`."""
+    """Fields of `Column` that determine its format."""
 
     digits: int
     scale: float
@@ -80,11 +80,11 @@ def mean(
     unit: str | None = None,
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of a mean over episodes.
+    """Return a column with the mean of a statistic over episodes.
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column; "": it is not shown.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: that of the statistic).
         unit: unit of the metric (default: that of the statistic).
         shown: fields of `Column`.
@@ -106,11 +106,11 @@ def per_minute(
     unit: str | None = None,
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of a sum over episodes, divided by their duration in minutes.
+    """Return a column with the sum of a statistic over episodes per minute of their duration.
 
     Args:
         statistic: one of `STATISTICS`. For the achievements of a task
-            (`hrc_env.evaluation.sums.ACHIEVED`) a rate of zero has an exact interval.
+            (`hrc_env.evaluation.sums.ACHIEVED`), the interval of a rate of zero is exact.
         heading: heading of the column, as in `mean`.
         name: name of the metric (default: `STATISTIC_per_minute`).
         unit: unit of the metric (default: that of the statistic, per minute).
@@ -136,13 +136,13 @@ def rate(
     per: str = "episode",
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of the rate of rare events, with an exact interval.
+    """Return a column with the rate of rare events and its exact interval.
 
     Args:
         statistics: one of `STATISTICS`, or several that are added.
         heading: heading of the column, as in `mean`.
         name: name of the metric (default: that of the first statistic).
-        per: the exposure, a name in `EXPOSURES`.
+        per: name of the exposure in `EXPOSURES`.
         shown: fields of `Column`.
     """
     names = (statistics,) if isinstance(statistics, str) else tuple(statistics)
@@ -158,12 +158,12 @@ def rate(
 
 
 class Exposure(NamedTuple):
-    """The amount of time or of episodes in which rare events are counted."""
+    """The amount of time, or the number of episodes, in which rare events are counted."""
 
     unit: str
-    """Unit of a count over the exposure."""
+    """Unit of a count divided by the exposure."""
     measure: Callable[[Episodes], float | Floats]
-    """Returns the exposure of episodes."""
+    """Function that returns the exposure of episodes."""
 
 
 EXPOSURES: dict[str, Exposure] = {
@@ -175,7 +175,7 @@ EXPOSURES: dict[str, Exposure] = {
 
 
 def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown]) -> Column:
-    """Return the column of the share of episodes in which a statistic is not zero.
+    """Return a column with the share of episodes in which a statistic is not zero.
 
     Args:
         statistic: one of `STATISTICS`.
@@ -191,12 +191,12 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
 
 
 def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Shown]) -> Column:
-    """Return the column "success": the share of a task's attempts that succeeded.
+    """Return the column "success", the share of a task's attempts that succeeded.
 
     Args:
         heading: heading of the column, as in `mean`.
-        clustered: whether attempts in one episode are dependent, so that the interval is over
-            episodes; otherwise every attempt counts as a trial.
+        clustered: whether attempts in one episode are dependent, so that the interval is computed
+            over episodes; otherwise every attempt counts as a trial.
         shown: fields of `Column`.
     """
 
@@ -212,7 +212,7 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
 def share_of_baseline(
     statistic: str, heading: str = "", name: str = "share", **shown: Unpack[Shown]
 ) -> Column:
-    """Return the column of a sum as a share of the baseline's on the same seeds.
+    """Return a column with a sum over episodes as a share of the baseline's on the same seeds.
 
     Args:
         statistic: one of `STATISTICS`.
@@ -233,7 +233,7 @@ def share_of_baseline(
 def difference_from_baseline(
     statistic: str, heading: str = "", name: str = "", unit: str = "1", **shown: Unpack[Shown]
 ) -> Column:
-    """Return the column of the mean difference from the baseline, seed by seed.
+    """Return a column with the mean difference from the baseline on the same seeds.
 
     Args:
         statistic: one of `STATISTICS`.
@@ -261,12 +261,12 @@ def _make_column(
     signed: bool = False,
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of the metric `ROW.name`."""
+    """Return a column for the metric `ROW.name`."""
     return Column(
         f"{{}}.{name}", heading, measure=measure, is_paired=is_paired, signed=signed, **shown
     )
 
 
 def _get_values(episodes: Episodes, statistic: str) -> Floats:
-    """Return a statistic of every episode (n,)."""
+    """Return the values (n,) of a statistic, one per episode."""
     return np.array([each[statistic] for each in episodes], float)

@@ -29,7 +29,7 @@ SETUPS = {
     "late": ("four cameras, 200 ms late", PerceptionSetup(latency_s=0.2)),
     "one": ("one camera after 1 s", PerceptionSetup(n_cameras=1)),
 }
-"""Perception setups with their descriptions; late images carry their time stamps."""
+"""Perception setups with their descriptions, by name; delayed images carry their time stamps."""
 COLUMNS = (
     per_minute(ACHIEVED, "goals a minute", name="goals_per_minute"),
     share_of_tries("success", digits=2),
@@ -59,24 +59,24 @@ class Condition:
     setup: str = "keypoints"
     """Perception setup, a name in `SETUPS`."""
     shield: str | None = None
-    """Name of the shield."""
+    """Name of the shield, or None for no shield."""
 
     @property
     def name(self) -> str:
-        """Name in results.json."""
+        """Name of the condition in results.json."""
         return f"{self.people}.{self.setup}.{self.shield or 'none'}"
 
     @property
     def words(self) -> str:
-        """Description in tables."""
+        """Description of the condition in tables."""
         shield = "no shield" if self.shield is None else f"shield `{self.shield}`"
         return f"{self.people} people, {SETUPS[self.setup][0]}, {shield}"
 
 
 def _make_conditions() -> tuple[Condition, ...]:
-    """Return all people with four cameras, and unaware people with other perception.
+    """Return conditions of all people with four cameras, and of unaware people with other setups.
 
-    Each is without and with a shield.
+    Each of them is listed without and with a shield.
     """
     bare = [Condition(people) for people in ("unaware", "hurried", "attentive")]
     bare += [Condition(setup=setup) for setup in SETUPS if setup != "keypoints"]
@@ -96,17 +96,18 @@ def make_study(
     n_seeds: int = 64,
     trust: bool = False,
 ) -> Study:
-    """Return the study of a policy under all conditions.
+    """Return the study that evaluates a policy under all conditions.
 
     Args:
-        policy: the policy as `hrc_env.agents.registry.make_agent` takes it.
-        ids: environments; a learnt policy fits one of them.
-        control: control of its actions; None: that of the policy's file, or else joint velocities.
+        policy: the policy as `hrc_env.agents.registry.make_agent` accepts it.
+        ids: ids of environments; a learnt policy fits only one environment.
+        control: control mode of the policy's actions; None: that of the policy's file, or joint
+            velocities if the file contains none.
         n_seeds: number of episodes per row.
         trust: whether pickles in the policy's checkpoint may be loaded, as in `make_agent`.
 
     Raises:
-        ConfigError: the policy or an environment does not exist, or there is no episode.
+        ConfigError: the policy or an environment does not exist, or `n_seeds` is below 1.
     """
     for task in ids:
         find_task(task)
@@ -142,17 +143,17 @@ ENTRY_METRICS = {
 }
 """Metrics of each task and condition in an entry, with their headings on the leaderboard."""
 Scores = Mapping[str, Metric]
-"""Metrics by "ID.CONDITION.METRIC"."""
+"""Metrics by name, as "ID.CONDITION.METRIC"."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One policy on the leaderboard."""
+    """The entry of one policy on the leaderboard."""
 
     policy: str
-    """The policy as `--policy` takes it."""
+    """Policy as the option `--policy` accepts it."""
     commit: str
-    """Commit of the repository."""
+    """Commit of the repository at which the policy was evaluated."""
     date: str
     """Date of the run."""
     scores: Scores
@@ -160,10 +161,10 @@ class Entry:
 
 
 def read_entry(path: Path) -> Entry:
-    """Return an entry from its file.
+    """Read an entry from its file.
 
     Raises:
-        ConfigError: the file is of another version of the benchmark, or not an entry.
+        ConfigError: the file belongs to another version of the benchmark, or is not an entry.
     """
     try:
         content = json.loads(path.read_text())
@@ -193,7 +194,7 @@ def write_entry(path: Path, entry: Entry) -> None:
 
 
 def add_entry(path: Path, policy: str, results: Path) -> None:
-    """Write the entry of a policy from the results.json of its run."""
+    """Write the entry of a policy to `path`, from the file results.json of its benchmark."""
     content = json.loads(results.read_text())
     scores = {key: Metric(**value) for key, value in content["metrics"].items()}
     git, day = str(provenance()["git"]), datetime.date.today().isoformat()

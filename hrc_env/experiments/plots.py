@@ -20,13 +20,13 @@ def make_figure(width_in: float, height_in: float) -> Figure:
 
 
 def save(figure: Figure, path: Path, dpi: int = 110) -> None:
-    """Write a figure as PNG; its folder is created."""
+    """Write a figure as a PNG file, and create its folder if necessary."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=dpi)
 
 
 def stamp(path: Path, text: str) -> None:
-    """Write a text into a strip that is added at the top of a picture file."""
+    """Add a strip with a text at the top of a picture file."""
     with Image.open(path) as picture:
         image = picture.convert("RGB")
     size = max(12, image.width // 60)
@@ -39,12 +39,12 @@ def stamp(path: Path, text: str) -> None:
 
 
 def compute_error_bars(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
-    """Return distances (2, n) from the values to both ends of their intervals, lower first."""
+    """Return the distances (2, n) of values from the lower and upper ends of their intervals."""
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
 
 
 def label_axes(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:
-    """Set the labels and the title of axes, and draw a pale grid in the background."""
+    """Set the labels and the title of axes, and draw a light grid in the background."""
     axis.set_xlabel(x, fontsize=12)
     axis.set_ylabel(y, fontsize=12)
     axis.set_title(title, fontsize=13)

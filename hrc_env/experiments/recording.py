@@ -1,6 +1,7 @@
 """Recordings of a worker beside a resting arm, on which every estimator can be replayed.
 
-Crops follow the estimator with which the film is recorded, not those that are replayed.
+The detector's crops follow the estimator that runs during the recording, not those that are
+replayed.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,7 @@ RecordT = TypeVar("RecordT")
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """T frames of one worker in view of a rig."""
+    """Recording of T frames of one worker by the cameras of a rig."""
 
     scene: Scene
     """The scene with its cameras."""
@@ -43,7 +44,7 @@ class Recording:
     windows: tuple[Windows, ...]
     """Crop windows of the cameras, one per frame."""
     beliefs: PoseEstimate
-    """Estimates (T, 1, ...) of the estimator that the crops followed."""
+    """Estimates (T, 1, ...) of the estimator that was run during the recording."""
 
 
 def record(
@@ -62,7 +63,7 @@ def record(
         config: the configuration of the environment.
         estimator: estimator whose predictions the crops follow.
         seed: seed of detector and estimator.
-        tick: is called with the growth of the completed share.
+        tick: callback that receives the increase of the completed share.
     """
     truth = worker_truth(load_bodies(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
@@ -88,7 +89,7 @@ def record(
 def replay(
     recording: Recording, estimator: str, cameras: Sequence[int], n_start: int, seed: int
 ) -> PoseEstimate:
-    """Return the estimates (T, 1, ...) of an estimator from the detections of some cameras.
+    """Run an estimator on recorded detections of some cameras and return its estimates (T, 1, ...).
 
     Args:
         recording: the recorded detections.
@@ -119,7 +120,7 @@ def replay(
 
 
 def concatenate(records: Sequence[RecordT]) -> RecordT:
-    """Return records of arrays (n, ...), which may be nested, concatenate along the first axis."""
+    """Concatenate records of arrays (n, ...), which may be nested, along the first axis."""
     first: Any = records[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(records)  # type: ignore[return-value, call-overload]

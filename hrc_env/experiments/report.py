@@ -20,7 +20,7 @@ from hrc_env.experiments.plots import stamp
 Metrics = Mapping[str, Metric]
 Cells = tuple[str, ...]
 Rows = Mapping[str, Cells] | Mapping[tuple[str, ...], Cells] | Mapping[Key, Cells]
-"""Cells before the numbers of each row, by its key."""
+"""Text cells at the beginning of each row, by the row's key."""
 _STYLE = """
 body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;
        margin: 2.5rem auto; padding: 0 1.2rem; }
@@ -35,31 +35,31 @@ code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of metrics under one title, in a report and in the documentation."""
+    """A table of metrics in a report and in the documentation."""
 
     name: str
     """Name by which a page of the documentation refers to the table."""
     title: str
     """Title of the table."""
     rows: Rows
-    """Cells before the numbers of each row, by its key."""
+    """Text cells at the beginning of each row, by the row's key."""
     columns: Sequence[Column]
     """Columns of numbers."""
     heads: tuple[str, ...] = ("",)
-    """Headings of the cells before the numbers."""
+    """Headings of the text cells."""
     note: str = ""
-    """Text below the table; `{n[METRIC]}` is the number of observations of a metric, `{NAME}` one
-    of `numbers`."""
+    """Text below the table. `{n[METRIC]}` is replaced by the number of observations of a metric,
+    and `{NAME}` by one of `numbers`."""
     numbers: Mapping[str, Column] = field(default_factory=dict)
-    """Metrics in the note and in sentences of the documentation, by name."""
+    """Metrics that the note or sentences of the documentation contain, by name."""
     printed: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that other publications report, by names of metrics."""
+    """Numbers that other publications report, by the names of their metrics."""
 
     def check(self, known: Collection[str]) -> None:
-        """Raise `ConfigError` if a row has the wrong number of cells or a column no metric.
+        """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.
 
         Args:
-            known: names of metrics.
+            known: names of the available metrics.
         """
         for row, cells in self.rows.items():
             if len(cells) != len(self.heads):
@@ -77,7 +77,7 @@ class Table:
                 )
 
     def select_rows(self, head: str, cell: str) -> "Table":
-        """Return the table with only the rows that have a text below one of the headings.
+        """Return the table with only the rows that contain a given text below a heading.
 
         Args:
             head: one of `heads`.
@@ -99,7 +99,7 @@ class Table:
         return (names | {c.metric for c in self.numbers.values()}) - self.printed.keys()
 
     def format_number(self, name: str, metrics: Metrics) -> str:
-        """Return one of `numbers` in the format of a sentence.
+        """Return one of `numbers` in a format for sentences.
 
         Args:
             name: name of the number.
@@ -108,13 +108,13 @@ class Table:
         return format_cell(self.numbers[name], metrics, ())
 
     def format_note(self, metrics: Metrics) -> str:
-        """Return the note with its numbers; they are 0 if rows were left out."""
+        """Return the note with its numbers; the counts of missing metrics are 0."""
         n = defaultdict(int, {name: metric.n for name, metric in metrics.items()})
         numbers = {name: self.format_number(name, metrics) for name in self.numbers}
         return self.note.format(n=n, **numbers)
 
     def to_markdown(self, metrics: Metrics, intervals: bool = True) -> str:
-        """Return the table in Markdown with its title and note, without rows that have no number.
+        """Return the table in Markdown with its title and note, without rows that lack numbers.
 
         Args:
             metrics: metrics by name.
@@ -138,7 +138,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The results of a study as text."""
+    """The report of a study."""
 
     title: str
     """Title of the report."""
@@ -147,10 +147,10 @@ class Report:
     parts: Sequence[str]
     """Paragraphs, headings, tables and pictures as Markdown, in their order."""
     spread: str = "95 % intervals over seeds"
-    """Meaning of the low and high ends of the numbers."""
+    """Description of the intervals of the numbers."""
     quick: str = ""
-    """Warning of a quick run below each table and on each figure, without marks of differences; ""
-    for other runs."""
+    """Warning that is shown below each table and on each figure of a quick run, in which
+    differences are not marked; "" for other runs."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
@@ -187,9 +187,9 @@ def describe_quick_run(
 
     Args:
         n: greatest number of seeds or other repetitions.
-        seconds: duration of a repetition [s]; (least, most) if they differ.
-        unit: name of a repetition.
-        consequence: the consequence for the reader.
+        seconds: duration of a repetition [s], or (shortest, longest) if durations differ.
+        unit: name of a repetition, in the singular.
+        consequence: the conclusion that readers should draw.
     """
     least, most = seconds if isinstance(seconds, tuple) else (seconds, seconds)
     duration = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"
@@ -199,18 +199,18 @@ def describe_quick_run(
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
 _TABLE = re.compile(r"^\|---", re.M)
 _DOT = " ●"
-"""Mark after a difference with an interval that excludes zero."""
+"""Mark after a difference if its interval excludes zero."""
 
 
 def _add_warning(part: str, words: str) -> str:
-    """Return a part of a report without marks, with a warning below its table or figure."""
+    """Return a part of a report without marks and with a warning below its table or figure."""
     part = part.replace(_DOT, "")
     is_shown = _TABLE.search(part) or _FIGURE.search(part)
     return f"{part}\n\n*{words}*" if is_shown else part
 
 
 def format_picture(path: Path, caption: str) -> str:
-    """Return the Markdown of a PNG in the folder `figures` beside the report, with its caption."""
+    """Return the Markdown of a PNG file in the report's folder `figures`, with its caption."""
     return f"![{caption}](figures/{path.name})\n\n*{caption}*"
 
 
@@ -220,7 +220,7 @@ def format_table(header: Sequence[str], rows: Iterable[Sequence[str]], n_heads: 
     Args:
         header: headings of the columns.
         rows: cells of each row.
-        n_heads: number of first columns that name the rows.
+        n_heads: number of leading columns that describe the rows.
     """
     lines = [" | ".join(line) for line in (header, *rows)]
     rule = "---|" * n_heads + "---:|" * (len(header) - n_heads)
@@ -243,10 +243,10 @@ def format_metrics(
 
 
 def format_rows(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list[tuple[str, ...]]:
-    """Return the cells of all rows that have any number.
+    """Return the cells of all rows that contain a number.
 
     Args:
-        rows: cells before the numbers, by key of the row.
+        rows: text cells at the beginning of each row, by the row's key.
         columns: columns of metrics.
         metrics: metrics by name.
     """
@@ -258,10 +258,10 @@ def format_rows(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list
 
 
 def format_cell(column: Column, metrics: Metrics, row: Key) -> str:
-    """Return the number of a row in the format of its column; a dash if there is none.
+    """Return the number of a row in the format of a column, or a dash if there is none.
 
     Args:
-        column: the metric and its format.
+        column: the column, which names the metric and defines its format.
         metrics: metrics by name.
         row: key of the row.
     """
@@ -283,13 +283,13 @@ def format_cell(column: Column, metrics: Metrics, row: Key) -> str:
 
 
 def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
-    """Return a number with its interval in the format of tables; a dash if it is not finite.
+    """Return a number with its interval in the format of tables, or a dash if it is not finite.
 
     Args:
-        metric: the number.
-        scale: factor from its unit to the unit shown.
+        metric: the number with its interval.
+        scale: factor from the metric's unit to the unit shown.
         digits: number of decimals.
-        signed: whether a positive number gets its sign.
+        signed: whether positive numbers are shown with their sign.
     """
     if not math.isfinite(metric.value):
         return "-"
@@ -300,14 +300,14 @@ def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: b
 def format_interval(value: float, low: float, high: float, digits: int, sign: str = "") -> str:
     """Return a value with the ends of its interval in brackets.
 
-    The interval is left out if it has no width at this number of digits.
+    The interval is left out if all three numbers are equal at this number of decimals.
 
     Args:
         value: the value.
         low: low end of the interval.
         high: high end of the interval.
         digits: number of decimals.
-        sign: "+" gives positive numbers their sign, too.
+        sign: "+" to show the sign of positive numbers, too.
     """
     texts = [f"{number:{sign}z,.{digits}f}" for number in (value, low, high)]
     return texts[0] if len({*texts}) == 1 else f"{texts[0]} ({texts[1]} to {texts[2]})"

@@ -1,7 +1,7 @@
-"""Choices of cameras in episodes: settings rotate over rigs, so no result depends on one place.
+"""Choices of cameras, over which episodes rotate so that no result depends on one position.
 
-With fewer than four cameras, the others fail after a warm-up, so that every estimator begins a
-track.
+In settings with fewer than four cameras, the others fail after a warm-up, so that every estimator
+begins a track.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 WARM_UP_S, DT_S = 1.0, HRCConfig().ctrl_dt
-"""Duration for which cameras that a setting removes are still there, and a control step [s]."""
+"""Durations of the warm-up, in which all cameras still work, and of a control step [s]."""
 N_WARM_UP = round(WARM_UP_S / DT_S)
 """Number of control steps in the warm-up."""
 Rig = tuple[int, ...]
@@ -24,41 +24,41 @@ NEIGHBOURS: tuple[Rig, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
 OPPOSITE: tuple[Rig, ...] = ((0, 2), (1, 3))
 TRIPLES: tuple[Rig, ...] = ((0, 1, 2), (1, 2, 3), (2, 3, 0), (3, 0, 1))
 MULTI = "multi"
-"""Name of all four cameras in names of metrics."""
+"""Name of all four cameras together in names of metrics."""
 CAMERA_LABELS = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
-"""Labels of each single camera and of all together, by their names in metrics."""
+"""Labels of each single camera and of all four together, by their names in metrics."""
 CHOICES: dict[str, Rig] = dict(zip(CAMERA_LABELS, (*SINGLE, ALL), strict=True))
-"""Rigs of each single camera and of all together, by their names in metrics."""
+"""Rigs of each single camera and of all four together, by their names in metrics."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Cameras and their faults, for some of a setting's episodes."""
+    """Cameras and their faults in some of the episodes of a setting."""
 
     cameras: tuple[CameraConfig, ...] = ()
-    """All cameras of the rig; empty: the scene's own."""
+    """All cameras of the rig; if empty, those of the scene."""
     faults: tuple[FaultConfig, ...] = ()
     """Faults of the cameras."""
 
 
 def keep_cameras(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
-    """Return a turn with a rig of which only the given cameras work after the warm-up."""
+    """Return a turn in which only the given cameras of a rig work after the warm-up."""
     lost = tuple(camera.name for c, camera in enumerate(rig) if c not in kept)
     return Turn(tuple(rig), (FaultConfig("lost", lost, start_s=WARM_UP_S),) if lost else ())
 
 
 def make_turns(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:
-    """Return one turn per choice of cameras that work after the warm-up, in a scene's own rig."""
+    """Return one turn per choice of the cameras of a scene that work after the warm-up."""
     return tuple(keep_cameras(RIGS[scene], rig) for rig in rigs)
 
 
 def delay(turn: Turn, latency_s: float, is_told: bool) -> Turn:
-    """Return a turn with late images.
+    """Return a turn in which images are delayed.
 
     Args:
         turn: the turn.
         latency_s: delay of the images [s].
-        is_told: whether images carry their time stamp; otherwise they appear to be current.
+        is_told: whether images carry their time stamps; otherwise they appear to be current.
     """
     if latency_s and is_told:
         cameras = tuple(replace(camera, latency_s=latency_s) for camera in turn.cameras)

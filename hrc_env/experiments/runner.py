@@ -1,4 +1,4 @@
-"""The runner of experiments: computes missing parts, then writes metrics and report."""
+"""The runner of experiments, which computes missing parts and writes metrics and reports."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -18,20 +18,20 @@ RecordT = TypeVar("RecordT")
 
 
 class Experiment(Protocol[PlayedT]):
-    """The interface of an experiment for the runner; its fields are its settings.
+    """Interface of an experiment for the runner; the fields of an experiment are its settings.
 
-    `hrc_env.experiments.study.Study` implements it for whole episodes; others have parts of their
-    own.
+    `hrc_env.experiments.study.Study` implements it for studies of whole episodes; the parts of
+    other experiments are not whole episodes.
     """
 
     @property
     def name(self) -> str:
-        """Name of the experiment in its folder and its results."""
+        """Name of the experiment in its folder and in its results."""
         ...
 
     @property
     def depends(self) -> tuple[str, ...]:
-        """Subsystems that its numbers depend on; their versions are in the parts' keys."""
+        """Subsystems on which the numbers depend; the keys of parts contain their versions."""
         ...
 
     @property
@@ -45,11 +45,11 @@ class Experiment(Protocol[PlayedT]):
         ...
 
     def settings(self) -> Mapping[str, Any]:
-        """Return all settings that its numbers depend on, for JSON."""
+        """Return all settings on which the numbers depend, for JSON."""
         ...
 
     def play(self, cache: PartCache) -> PlayedT:
-        """Return the results of all parts, from the cache or computed."""
+        """Return the results of all parts, and compute those that are not in the cache."""
         ...
 
     def metrics(self, played: PlayedT) -> dict[str, Metric]:
@@ -59,8 +59,9 @@ class Experiment(Protocol[PlayedT]):
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
         """Draw the figures into a folder and return the report.
 
-        An experiment that may be too short to compare anything warns here, by `Report.quick` or by
-        `quick_note`. Tables that also appear in the documentation come from `shown_tables`.
+        An experiment that may be too short for comparisons returns a warning, as `Report.quick` or
+        as the attribute `quick_note`. The method `shown_tables` returns the tables that also appear
+        in the documentation.
         """
         ...
 
@@ -91,17 +92,18 @@ def run_experiment(
         experiment: the experiment.
         out: folder of results and parts; parts of an earlier run with the same settings and
             versions are not computed again.
-        progress: is called with the growth of the completed share, and its part.
-        overwrite: whether to delete results in the folder that are of another study or other
-            settings.
-        engine: where parts are computed, without effect on them; None: the fastest on this machine.
+        progress: callback that receives the increase of the completed share and the label of the
+            current part.
+        overwrite: whether to delete results of another study or of other settings in the folder.
+        engine: engine that computes the parts, without effect on the results; None: the fastest on
+            this machine.
 
     Returns:
         All metrics by name.
 
     Raises:
-        ConfigError: the folder holds results of another study or other settings; the differences
-            are listed.
+        ConfigError: the folder contains results of another study or of other settings; the message
+            lists the differences.
     """
     out = Path(out)
     claim_folder(out, experiment.name, overwrite, experiment.settings())
@@ -117,11 +119,11 @@ def run_experiment(
 def is_as_short(config: Any, quick: Any) -> bool:
     """Return whether an experiment is as short as its quick form.
 
-    It is if any of the numbers that the quick form reduces is no greater than in the quick form.
+    This holds if any of the numbers that the quick form reduces is no greater than in that form.
 
     Args:
         config: the settings, a dataclass whose fields all have defaults.
-        quick: its quick form.
+        quick: the settings of the quick form.
     """
     usual = type(quick)()
     names = [field.name for field in fields(quick)]
@@ -139,13 +141,13 @@ def _get_size(value: Any) -> float:
 
 
 def override(record: RecordT, **values: Any) -> RecordT:
-    """Return a record with the given values; None keeps a field."""
+    """Return a copy of a record with the given values; a value of None leaves a field unchanged."""
     given = {name: value for name, value in values.items() if value is not None}
     return replace(record, **given)  # type: ignore[type-var]
 
 
 def check_at_least_one(record: Any, *names: str) -> None:
-    """Raise `ConfigError` if one of these fields of a record is below 1."""
+    """Raise `ConfigError` if one of the named fields of a record is below 1."""
     for name in names:
         if getattr(record, name) < 1:
             option = "--seeds" if name == "n_seeds" else name

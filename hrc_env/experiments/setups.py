@@ -35,13 +35,13 @@ class PerceptionSetup:
     latency_s: float = 0.0
     """Delay from exposure to arrival of an image [s]."""
     is_told: bool = True
-    """Whether images carry their time stamp; otherwise they appear to be current."""
+    """Whether images carry their time stamps; otherwise they appear to be current."""
     is_alone: bool = False
-    """Whether the other cameras are missing from the start."""
+    """Whether the cameras that do not work are missing from the start, without a warm-up."""
 
     @property
     def name(self) -> str:
-        """Name in results.json."""
+        """Name of the setup in results.json."""
         if self.level in ("truth", "none"):
             return self.level
         name = f"{self.level}_{self.estimator}_{self.n_cameras}cam_{1000 * self.latency_s:.0f}ms"
@@ -49,7 +49,7 @@ class PerceptionSetup:
 
     @property
     def words(self) -> str:
-        """Description in tables and figures."""
+        """Description of the setup in tables and figures."""
         if self.level in ("truth", "none"):
             return self.level
         words = f"{self.estimator}, {self.n_cameras} camera{'s' if self.n_cameras > 1 else ''}"
@@ -64,7 +64,7 @@ class PerceptionSetup:
 
     @property
     def is_plain(self) -> bool:
-        """Whether all cameras work and are on time."""
+        """Whether all cameras work and no images are delayed."""
         return self.n_cameras == 4 and not self.latency_s
 
     @property
@@ -73,10 +73,10 @@ class PerceptionSetup:
         return self.list_turns(RIGS["lab"])
 
     def list_turns(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
-        """Return cameras and their faults for another rig of four.
+        """Return the cameras and faults over which episodes rotate, for any rig of four cameras.
 
         Args:
-            rig: the cameras of the rig.
+            rig: the four cameras of the rig.
         """
         turns = (
             Turn(tuple(rig[c] for c in kept)) if self.is_alone else keep_cameras(rig, kept)
@@ -86,17 +86,17 @@ class PerceptionSetup:
 
 
 LATE_S = (0.12, 0.2)
-"""Delays of late images [s]: three and five control steps."""
+"""Delays of images [s], which are three and five control steps."""
 LATE = tuple(PerceptionSetup(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
-"""Setups of four cameras with late images, with and without time stamps."""
+"""Setups of four cameras with delayed images, with and without time stamps."""
 ON_REQUEST = ("kalman", "ransac", "paper")
-"""Estimators that are compared on request only; with four cameras `kalman` equals the default."""
+"""Estimators that are compared only on request; with four cameras, `kalman` equals the default."""
 REFERENCE = PerceptionSetup().name
 """Name of the setup with which all others are compared."""
 
 
 def list_setups() -> dict[str, PerceptionSetup]:
-    """Return the setups by name, with every registered estimator; the slowest is last."""
+    """Return the setups by name, including every registered estimator; the slowest is last."""
     setups = (
         PerceptionSetup("truth"),
         PerceptionSetup("none"),
@@ -116,7 +116,7 @@ def list_default_setups() -> tuple[str, ...]:
 
 
 def find_setup(name: str) -> PerceptionSetup:
-    """Return a setup by name; raise `ConfigError` if there is none."""
+    """Return a setup by name, or raise `ConfigError` if it does not exist."""
     setups = list_setups()
     check_names("perception setup", [name], setups)
     return setups[name]

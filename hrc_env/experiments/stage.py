@@ -1,7 +1,7 @@
 """Environments with one perception setup, for episodes of a fixed length.
 
-Workers ignore the robot, so all policies, estimators and shields meet the same motions. Episodes
-rotate over the setup's cameras.
+Workers ignore the robot, so that their motions are the same for all policies, estimators and
+shields. Episodes rotate over the setup's cameras.
 """
 
 import warnings
@@ -19,7 +19,7 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.rigs import Turn
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.vector.shards import Shards
@@ -27,11 +27,11 @@ from hrc_env.vector.shards import Shards
 PEOPLE = "unaware"
 """Kind of workers, which ignore the robot: their motion does not depend on its actions."""
 N_TOGETHER = 300
-"""Number of episodes that are played together."""
+"""Greatest number of episodes that are played as one batch."""
 Rows = dict[str, list[Any]]
 """Lists of sums by name, one value per episode."""
 Block = Callable[[Shards, list[int], PartProgress], Rows]
-"""A function that plays one episode per seed together and returns their sums."""
+"""Function that plays one episode per seed as a batch and returns the sums of the episodes."""
 
 
 class Stage:
@@ -44,12 +44,12 @@ class Stage:
         self._envs: dict[tuple[int, int], Shards] = {}
 
     def play(self, seeds: Sequence[int], play_block: Block, tick: PartProgress) -> Rows:
-        """Return the sums of all episodes, in the order of the seeds.
+        """Play all episodes and return their sums, in the order of the seeds.
 
         Args:
-            seeds: one seed per episode; the k-th has turn k modulo the number of turns.
-            play_block: plays some of the episodes.
-            tick: is called with the growth of the completed share.
+            seeds: one seed per episode; episode k uses turn k modulo the number of turns.
+            play_block: function that plays a batch of episodes.
+            tick: callback that receives the increase of the completed share.
         """
         rows, n = Rows(), len(seeds)
         for k, turn in enumerate(self.turns[:n]):
@@ -71,7 +71,7 @@ class Stage:
 
     def _get_env(self, k: int, turn: Turn, n_episodes: int) -> Shards:
         if (k, n_episodes) not in self._envs:
-            settings = settle(
+            settings = resolve_settings(
                 perception=self.setup.level, estimator=self.setup.estimator, people=PEOPLE,
                 faults=list(turn.faults), cameras=list(turn.cameras), **self.made_with,
             )  # fmt: skip
@@ -89,7 +89,7 @@ class EndlessEpisodes:
     def __init__(self, env: Shards) -> None:
         self.env = env
         self.terminated: Bools = np.zeros(env.bounds[-1], np.bool_)
-        """Truth values (B,): an episode ended with the last step."""
+        """Mask (B,) of the environments in which an episode reached its end in the last step."""
 
     def reset(self, seeds: Sequence[int]) -> Observation:
         """Begin an episode for every seed and return the observation."""
@@ -97,7 +97,7 @@ class EndlessEpisodes:
         return self.env.reset(np.arange(len(seeds)), rngs).observation
 
     def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
-        """Step every environment; no episode ever ends."""
+        """Step every environment without ending any episode."""
         shape = len(self.terminated), self.env.first.n_actions
         result = self.env.step(check_action(action, shape, self.env.first.control))
         self.terminated, never = result.terminated, np.zeros_like(result.terminated)

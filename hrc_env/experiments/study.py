@@ -1,10 +1,7 @@
-"""Studies of whole episodes: a question, the rows that answer it, and their statistics.
+"""Studies of whole episodes, declared by their rows, columns and tables.
 
-A declaration that cannot work raises a `ConfigError` at once: an unknown agent, estimator, shield,
-environment or argument; a baseline that is no row; a column of an unknown statistic.
-
-A declaration that cannot work raises a `ConfigError` at once: an unknown agent,
-estimator, shield, environment or argument; a baseline that is no row; a column of no statistic.
+An invalid declaration raises a `ConfigError` when it is made, for example if it names an unknown
+agent, estimator, shield, environment, argument, statistic or baseline.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.engines.files import carried
@@ -30,17 +27,17 @@ from hrc_env.experiments.versions import check_subsystems, hash_source, make_key
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.rigs import RIGS
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import ESTIMATORS
 
 Played = Mapping[str, list[dict[str, float]]]
-"""Statistics of episodes by row, in the order of their seeds."""
+"""Statistics of the episodes of each row, in the order of their seeds."""
 FOUR = PerceptionSetup()
-"""Four cameras, on time, simulated by the emulator."""
+"""Perception setup with four cameras without delay and detections from the emulator."""
 GIVEN_BY_SETUP = ("perception", "estimator")
-"""Arguments of the environment that come from `Row.setup`."""
+"""Arguments of the environment that are taken from `Row.setup`."""
 
 
 class Shard(NamedTuple):
@@ -52,22 +49,22 @@ class Shard(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of a study: agent, people, perception and shield."""
+    """One row of a study: episodes of an agent in an environment."""
 
     words: str | tuple[str, ...]
-    """Cells before the numbers of the row."""
+    """Text cells at the beginning of the row."""
     n_episodes: int
     """Number of episodes, which use the first seeds of the study."""
     agent: AgentChoice = "scripted"
-    """Agent as `hrc_env.agents.registry.make_agent` takes it, or a function that makes one."""
+    """Agent as `hrc_env.agents.registry.make_agent` accepts it, or a function that makes one."""
     setup: PerceptionSetup = FOUR
     """Perception of the robot; episodes rotate over its cameras."""
     env: Mapping[str, Any] = field(default_factory=dict)
-    """Other arguments of the environment, as of `gymnasium.make`."""
+    """Other arguments of the environment, as in `gymnasium.make`."""
     baseline: str | None = None
     """Name of the row with which `is_paired` columns compare this row on the same seeds."""
     n_together: int = 250
-    """Number of episodes in one part, which are played together."""
+    """Greatest number of episodes in one part, which are played as one batch."""
     is_shown: bool = True
     """Whether the row appears in the table."""
     trust: bool = False
@@ -75,7 +72,7 @@ class Row:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Cells before the numbers."""
+        """Text cells at the beginning of the row."""
         return (self.words,) if isinstance(self.words, str) else self.words
 
     @property
@@ -85,14 +82,16 @@ class Row:
         return asked or find_task(self.env.get("task", DEFAULT)).max_episode_steps
 
     def keywords(self) -> list[dict[str, Any]]:
-        """Return the arguments of environments, over which episodes rotate."""
+        """Return the arguments of the environments over which episodes rotate."""
         setup, known = self.setup, dict(self.env)
         known["perception"] = setup.level
         if setup.level in ("keypoints", "pixels"):
             known["estimator"] = setup.estimator
         if setup.is_plain:
             return [known]
-        scene = settle(**{name: known[name] for name in ("task", "scene") if name in known}).scene
+        scene = resolve_settings(
+            **{name: known[name] for name in ("task", "scene") if name in known}
+        ).scene
         faults = list(known.pop("faults", ()))
         return [
             {**known, "cameras": list(turn.cameras), "faults": [*turn.faults, *faults]}
@@ -100,7 +99,7 @@ class Row:
         ]
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings that its episodes depend on besides seeds, for JSON."""
+        """Return all settings on which the episodes depend, except seeds, for JSON."""
         settings = {
             "agent": describe_agent(self.agent),
             "setup": asdict(self.setup),
@@ -127,7 +126,7 @@ class Row:
         check_choice(self.agent)
         for keywords in self.keywords():
             keywords.pop("max_episode_steps", None)  # Gymnasium's own
-            settle(**keywords)
+            resolve_settings(**keywords)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,28 +134,28 @@ class Study:
     """The declaration of a study: rows, columns and tables."""
 
     name: str
-    """Name of the study in its folder and its results."""
+    """Name of the study in its folder and in its results."""
     title: str
     """Title of the report."""
     about: str
-    """The question and the method."""
+    """Question and method of the study."""
     depends: tuple[str, ...]
-    """Subsystems that its numbers depend on (`behaviour.toml`)."""
+    """Subsystems on which the numbers depend (`behaviour.toml`)."""
     first_seed: int
-    """Seed of the first episode of every row; later ones count up."""
+    """Seed of the first episode of every row; it increases by one with each further episode."""
     rows: Mapping[str, Row]
     """Rows by name, in the order in which they are played and shown. Rows of policies that are not
     trained yet may be missing if `tables` are given."""
     columns: tuple[Column, ...]
-    """Statistics of every row (`hrc_env.columns`)."""
+    """Columns, each of which computes a statistic of every row (`hrc_env.columns`)."""
     heads: tuple[str, ...] = ("",)
-    """Headings of the cells before the numbers."""
+    """Headings of the text cells at the beginning of rows."""
     note: str = ""
-    """Text below the table, as `Table.note`."""
+    """Text below the table, as in `Table.note`."""
     tables: tuple[Table, ...] = ()
-    """Tables to show instead of one table of all rows and columns."""
+    """Tables to show; if empty, one table of all rows and columns is shown."""
     derive: Callable[[Metrics], Metrics] | None = None
-    """Returns further metrics from those of the columns."""
+    """Function that computes further metrics from those of the columns."""
     n_quick: int = 4
     """Number of episodes per row in the quick form."""
     threads: int | None = None
@@ -165,7 +164,7 @@ class Study:
     """Whether this is the quick form."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for a row, a column or a table that refers to nothing."""
+        """Raise `ConfigError` if a row, a column or a table is invalid."""
         check_subsystems(self.depends)
         if not self.columns or not (self.rows or self.tables):
             raise ConfigError(f"Study {self.name!r} must have rows and columns.")
@@ -223,26 +222,26 @@ class Study:
         return describe_quick_run(max(row.n_episodes for row in self.rows.values()), seconds)
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings that its numbers depend on, for JSON."""
+        """Return all settings on which the numbers depend, for JSON."""
         rows = {name: {"n_episodes": row.n_episodes, **row.settings()}
                 for name, row in self.rows.items()}  # fmt: skip
         return {"first_seed": self.first_seed, "rows": rows}
 
     def select(self, beginnings: Sequence[str]) -> "Study":
-        """Return the study of rows with the given beginnings of names, and their baselines.
+        """Return the study with only the rows of given name prefixes, and their baselines.
 
         Raises:
-            ConfigError: no row begins with one of them.
+            ConfigError: one of the prefixes matches no row.
         """
         for each in beginnings:
             if not any(name.startswith(each) for name in self.rows):
-                raise unknown(f"row of {self.name!r}", each, self.rows)
+                raise make_unknown_name_error(f"row of {self.name!r}", each, self.rows)
         kept = {name for name in self.rows if name.startswith(tuple(beginnings))}
         kept |= {baseline for name in kept if (baseline := self.rows[name].baseline) is not None}
         return replace(self, rows={name: row for name, row in self.rows.items() if name in kept})
 
     def shorten(self) -> "Study":
-        """Return the quick form: few episodes per row; one short episode of rendered images."""
+        """Return the quick form: few episodes per row, or a short one if images are rendered."""
 
         def shorten_row(row: Row) -> Row:
             if row.setup.level == "pixels":
@@ -253,7 +252,7 @@ class Study:
         return replace(self, rows=rows, is_quick=True)
 
     def play(self, cache: PartCache) -> Played:
-        """Return the episodes of every row, each part from the cache or computed."""
+        """Return the episodes of every row, and compute the parts that are not in the cache."""
         shards = [(name, shard) for name, row in self.rows.items()
                   for shard in split_row(row, self.first_seed)]  # fmt: skip
         is_drawn = [self.rows[name].setup.level == "pixels" for name, _ in shards]
@@ -273,7 +272,7 @@ class Study:
         return Part(label, make, make_key(made_of, self.depends))
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return all metrics as "ROW.NAME"."""
+        """Return all metrics by name, as "ROW.NAME"."""
         metrics: dict[str, Metric] = {}
         for name, row in self.rows.items():
             own, theirs = played[name], played[row.baseline or name]
@@ -297,7 +296,7 @@ class Study:
         Args:
             played: episodes by row.
             metrics: all metrics by name.
-            figures: folder of figures; a study of episodes draws none.
+            figures: folder of figures, which is not used, because the report has none.
         """
         parts = [table.to_markdown(metrics) for table in self.shown_tables()]
         return Report(self.title, self.about, parts)
@@ -314,14 +313,14 @@ def split_row(row: Row, first_seed: int) -> list[Shard]:
 def play_shard(
     row: Row, first_seed: int, n_episodes: int, threads: int | None, tick: PartProgress
 ) -> dict[str, Any]:
-    """Return the episodes of a part; each turn of the row's cameras has a block of them.
+    """Play the episodes of a part, with one block of episodes for each turn of the row's cameras.
 
     Args:
         row: the row.
         first_seed: seed of the first episode.
         n_episodes: number of episodes.
         threads: number of threads that environments share; None: the number of cores.
-        tick: is called with the growth of the completed share.
+        tick: callback that receives the increase of the completed share.
     """
     make, episodes = get_agent_factory(row.agent, row.trust), list[dict[str, float]]()
     turns = row.keywords()
@@ -337,7 +336,7 @@ def play_shard(
 
 
 def describe(value: Any) -> Any:
-    """Return a value in a form for JSON: a function becomes its name and the digest of its file."""
+    """Convert a value for JSON; a function becomes its name and the digest of its source file."""
     if isinstance(value, Mapping):
         return {str(name): describe(each) for name, each in value.items()}
     if isinstance(value, list | tuple):

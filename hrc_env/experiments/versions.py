@@ -1,9 +1,9 @@
-"""Versions of behaviour, by which finished parts and tables are known to be current.
+"""Versions of behaviour, which show whether finished parts and tables are up to date.
 
-`behaviour.toml` gives each subsystem a number. A study names the subsystems that its numbers depend
-on; a part made at other versions or with other settings is computed again. Probes
-(`tests/behaviour/`) raise a number when the behaviour of its subsystem changes, so a change of code
-without effect on behaviour keeps all parts.
+`behaviour.toml` gives each subsystem a version number. A study names the subsystems on which its
+results depend; a part computed with other versions or other settings is computed again. Probes
+(`tests/behaviour/`) increase the number when the behaviour of its subsystem changes, so that
+changes of code without effect on behaviour invalidate no parts.
 """
 
 import hashlib
@@ -80,8 +80,8 @@ def make_key(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
     """Return the key of a finished part: a digest of its settings and of the subsystems' versions.
 
     Args:
-        settings: all settings that the part's numbers depend on besides code, for JSON.
-        subsystems: names of the subsystems that they depend on.
+        settings: all settings on which the part's numbers depend besides the code, for JSON.
+        subsystems: names of the subsystems on which the numbers depend.
     """
     content = json.dumps([settings, select_versions(subsystems)], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()[:16]
@@ -93,10 +93,10 @@ def hash_file(path: Path) -> str:
 
 
 def hash_source(item: object) -> str:
-    """Return the digest of the file that defines an object which a user registered.
+    """Return the digest of the file that defines an object registered by a user.
 
-    A user's estimator has no version; its file stands for it. The digest is "" for objects of this
-    package, which has versions, and for objects without a file.
+    It replaces a version, which a user's object does not have. The digest is "" for objects of this
+    package, which have versions, and for objects without a file.
     """
     try:
         path = Path(inspect.getfile(item)).absolute()  # type: ignore[arg-type]

@@ -1,7 +1,7 @@
-"""Assignment: every row of a cost matrix is given a column of its own, at the least total cost.
+"""Linear assignment: each row of a cost matrix gets a different column, at minimum total cost.
 
-The method is that of the shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), as a
-kernel for matrices with a few rows.
+The method is shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), as a compiled
+kernel for matrices with few rows.
 """
 
 import numpy as np
@@ -12,17 +12,17 @@ from hrc_env.core.typing import Floats, Ints
 
 @kernel(makes_arrays=True)
 def assign_rows(cost: Floats, column: Ints) -> None:
-    """Write the column that each row of a cost matrix is assigned to.
+    """Assign each row of a cost matrix to a different column, at minimum total cost.
 
     Args:
         cost: (n, m) finite costs, with m >= n.
-        column: (n,) is filled.
+        column: (n,) output: the column of each row.
     """
     n_rows, n_columns = cost.shape
     if n_columns == 1:
         column[:n_rows] = 0
         return
-    # Rows and columns count from 1 here; column 0 stands for "the row that is being placed".
+    # Rows and columns count from 1 here; column 0 stands for the row that is being assigned.
     row_price, column_price = np.zeros(n_rows + 1), np.zeros(n_columns + 1)
     owner, before = np.zeros(n_columns + 1, np.int64), np.zeros(n_columns + 1, np.int64)
     least, done = np.empty(n_columns + 1), np.empty(n_columns + 1, np.bool_)

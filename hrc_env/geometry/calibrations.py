@@ -1,6 +1,6 @@
-"""Rigs from the calibration files of other tools: anipose, FreeMoCap, Caliscope, Pose2Sim.
+"""Import of rigs from calibration files of anipose, FreeMoCap, Caliscope and Pose2Sim.
 
-Such a file is TOML with a table for each camera:
+These are TOML files with a table for each camera:
 
 [cam_0]
 name = "left"
@@ -10,9 +10,10 @@ distortions = [-0.21, 0.06, 0.0, 0.0, 0.0]
 rotation = [1.2, -1.2, 1.1]
 translation = [0.1, 1.4, 3.1]
 
-`rotation` (Rodrigues' vector, or a matrix) and `translation` take points of the world to the
-camera. `fisheye = true` means OpenCV's fisheye model. Pixels count from the middle of the first
-one, ours from the image's corner: half a pixel is added to the principal point.
+`rotation` (a Rodrigues vector or a matrix) and `translation` transform points from the world to the
+camera frame. `fisheye = true` selects OpenCV's fisheye model. These tools measure pixel coordinates
+from the centre of the first pixel, but this package from the image's corner: half a pixel is added
+to the principal point.
 """
 
 import math
@@ -29,28 +30,28 @@ from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, ma
 from hrc_env.geometry.rotations import from_rotation_vector
 
 ENTRIES = ("size", "matrix", "distortions", "rotation", "translation")
-"""Entries that the table of a camera must hold."""
+"""Entries that the table of a camera must contain."""
 HALF_PX = 0.5
-"""Distance from the middle of the first pixel to the image's corner [px]."""
+"""Distance along each axis from the centre of the first pixel to the image's corner [px]."""
 MAX_SPREAD_M = 30.0
-"""Greatest distance of cameras from their middle, or of one from the origin, in metres; lengths
-beyond it are taken to be in millimetres."""
+"""Greatest distance of cameras from their centroid, or of a single camera from the origin [m];
+files with greater lengths are assumed to be in millimetres."""
 MM = 1e-3
-"""A millimetre [m]."""
+"""Length of a millimetre [m]."""
 MIN_UPRIGHT = 0.7
-"""Least component of the upright direction of the images along the axis of the world that is up."""
+"""Minimum component of the images' upright direction along the upward axis of the world."""
 
 
 def is_calibration(content: Mapping[str, Any]) -> bool:
-    """Return whether a TOML file's content is a calibration of another tool."""
+    """Return whether the content of a TOML file is a calibration written by another tool."""
     return any("matrix" in table for table in _tables(content).values())
 
 
 def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras of a calibration that another tool has written.
 
-    Lengths in millimetres are converted to metres; a `UserWarning` reports them, and a world
-    with a z axis that is not up.
+    Lengths in millimetres are converted to metres. A `UserWarning` reports such a conversion, and a
+    world frame whose z axis does not point upwards.
 
     Args:
         content: content of the file.
@@ -72,14 +73,14 @@ def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[Cam
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the tables of a file that may be cameras, by key; Caliscope nests them in one."""
+    """Return the tables of a file that may be cameras, by key; Caliscope nests them in a table."""
     nested = content.get("cameras")
     inside = cast("Mapping[str, Any]", nested) if isinstance(nested, Mapping) else content
     return {key: each for key, each in inside.items() if isinstance(each, Mapping)}
 
 
 def _parse_camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
-    """Return the camera of a table, with lengths in the file's unit."""
+    """Return the camera that a table describes, with lengths in the file's unit."""
     missing = [word for word in ENTRIES if word not in table or table[word] in ("null", [], None)]
     if missing:
         has_no_pose = {"rotation", "translation"} & {*missing}
@@ -105,7 +106,7 @@ def _parse_camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
 
 
 def _parse_numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) -> Floats:
-    """Return an entry of a table as finite numbers of a shape, in which -1 is any length."""
+    """Return an entry of a table as an array of finite numbers; -1 in `shape` is any length."""
     try:
         values = np.asarray(table[word], float)
         values = values.reshape(-1 if shape == (-1,) else shape)
@@ -118,7 +119,7 @@ def _parse_numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) 
 
 
 def _convert_to_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[CameraConfig, ...]:
-    """Return the cameras in metres, with a warning about another unit or upward axis."""
+    """Return the cameras in metres; warn if the file has another unit or upward axis."""
     eyes = np.array([camera.eye_world for camera in cameras])
     centred = eyes - eyes.mean(0) if len(eyes) > 1 else eyes
     unit_m = MM if np.linalg.norm(centred, axis=-1).max() > MAX_SPREAD_M else 1.0
@@ -143,7 +144,7 @@ def _convert_to_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[C
 
 
 def _rescale(camera: CameraConfig, unit_m: float) -> CameraConfig:
-    """Return a camera with its position converted from a unit to metres."""
+    """Convert the position of a camera from a unit to metres."""
     if unit_m == 1.0:
         return camera
     T_world_from_cam = np.eye(4)

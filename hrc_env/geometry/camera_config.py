@@ -1,4 +1,4 @@
-"""Descriptions of cameras (pose, lens, sensor, timing), and rig files.
+"""Configuration of cameras (pose, lens, sensor, timing), and rig files.
 
 A rig file is TOML with a `[[camera]]` table for each camera, with the fields of `CameraConfig`:
 
@@ -7,8 +7,8 @@ name = "left"
 eye_world = [2.9, 2.6, 2.45]
 lens = {model = "kannala_brandt", coefficients = [0.0667]}
 
-Instead, a table may have `K`, `distortion` and `T_world_from_cam` (see
-`CameraConfig.from_matrices`), and the file may be the calibration of another tool (see
+Alternatively, a table may have `K`, `distortion` and `T_world_from_cam` (see
+`CameraConfig.from_matrices`), or the file may be a calibration of another tool (see
 `calibrations`).
 """
 
@@ -22,7 +22,13 @@ from typing import Any, NoReturn, cast
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import answer_unknown_fields, from_mapping, plain, read_toml, to_toml
+from hrc_env.core.mapping import (
+    answer_unknown_fields,
+    convert_to_plain,
+    from_mapping,
+    read_toml,
+    to_toml,
+)
 from hrc_env.core.typing import Floats, Rotations, Transforms
 from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
 from hrc_env.geometry.rotations import about_axis, look_at
@@ -30,9 +36,9 @@ from hrc_env.geometry.rotations import about_axis, look_at
 MOST_CAMERAS = 16
 """Greatest number of cameras in a rig."""
 SIZE_PX = (64, 16_384)
-"""Least and greatest width and height of an image [px]."""
+"""Minimum and maximum width and height of an image [px]."""
 HFOV_DEG = (1.0, 340.0)
-"""Least and greatest horizontal field of view [degrees]; without a fisheye lens the limit is
+"""Minimum and maximum horizontal field of view [degrees]; without a fisheye lens, the maximum is
 179."""
 MAX_LATENCY_S = 1.0
 """Greatest latency of a camera, which is the length of the tracker's memory [s]."""
@@ -41,15 +47,15 @@ MAX_LATENCY_S = 1.0
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class CameraConfig:
-    """One fixed camera."""
+    """Configuration of a fixed camera."""
 
     name: str
     """Name of the camera, unique in its rig."""
     eye_world: tuple[float, float, float]
     """Position of the camera in the world frame [m]."""
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
-    """Point in the world frame that the camera looks at [m]; the default is the middle of the space
-    that robot and worker share."""
+    """Point in the world frame at which the camera points [m]; the default is the centre of the
+    space that robot and worker share."""
     hfov_deg: float = 90.0
     """Horizontal field of view through the lens [degrees]; ignored if `focal_px` is given."""
     width_px: int = 1920
@@ -61,17 +67,17 @@ class CameraConfig:
     focal_px: tuple[float, ...] = ()
     """Focal lengths fx, fy [px]; if empty, both follow from `hfov_deg`."""
     centre_px: tuple[float, ...] = ()
-    """Principal point cx, cy [px]; if empty, the middle of the image."""
+    """Principal point cx, cy [px]; if empty, the centre of the image."""
     lens: Lens = field(default_factory=Lens)
     """Distortion of the image by the lens."""
     rate_hz: float = 0.0
-    """Number of images per second, taken at control steps; 0: one at every control step [Hz]."""
+    """Frame rate; images are taken at control steps, and at all of them if it is 0 [Hz]."""
     latency_s: float = 0.0
-    """Delay from taking an image to its arrival, at most 1 s; the tracker applies an image at the
-    time at which it was taken [s]."""
+    """Delay from the exposure of an image to its arrival, at most 1 s; the tracker applies an image
+    at the time of its exposure [s]."""
     exposure_s: float = 0.0
-    """Time for which the shutter is open, at most 0.1 s; moving things are blurred, at perception
-    level `pixels` only [s]."""
+    """Exposure time, at most 0.1 s; it causes motion blur, but only at perception level `pixels`
+    [s]."""
 
     def __post_init__(self) -> None:
         places = (*self.eye_world, *self.target_world, self.roll_deg)
@@ -102,16 +108,16 @@ class CameraConfig:
         eye_world: tuple[float, float, float],
         target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
     ) -> "CameraConfig":
-        """Return a camera of a commercial model at a place.
+        """Return a camera of a commercial model at a given position.
 
         Args:
             make: a key of `MAKES`; "gopro_hero8_wide" is the paper's camera.
             name: name of the camera, unique in its rig.
             eye_world: position of the camera in the world frame [m].
-            target_world: point in the world frame that it looks at [m].
+            target_world: point in the world frame at which the camera points [m].
 
         Raises:
-            ConfigError: there is no such make.
+            ConfigError: `make` is not a key of `MAKES`.
         """
         check_names("make of camera", [make], MAKES)
         return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
@@ -126,13 +132,13 @@ class CameraConfig:
         distortion: Lens | Sequence[float] = (),
         fisheye: bool = False,
     ) -> "CameraConfig":
-        """Return the camera that projects as OpenCV does with these matrices.
+        """Return the camera with these matrices, which projects points as OpenCV does.
 
         Args:
             name: name of the camera, unique in its rig.
-            K: (3, 3) intrinsics without skew [px]. Pixels count from the image's corner; to a K of
-                pixels that count from the middle of the first one, add 0.5 to cx and cy.
-            T_world_from_cam: (4, 4) pose of OpenCV's camera axes in the world, z up [m].
+            K: (3, 3) intrinsics without skew [px]. Pixel coordinates start at the image's corner;
+                if those of a K start at the centre of the first pixel, add 0.5 to cx and cy.
+            T_world_from_cam: (4, 4) pose of OpenCV's camera axes in the world, with z up [m].
             size_px: width and height of the image [px].
             distortion: a lens, or OpenCV's coefficients.
             fisheye: whether the coefficients are those of OpenCV's fisheye model.
@@ -169,7 +175,7 @@ class CameraConfig:
 
 @dataclass(frozen=True, slots=True)
 class _Matrices:
-    """The arguments of `CameraConfig.from_matrices` as mappings and rig files hold them."""
+    """The arguments of `CameraConfig.from_matrices`, as they occur in mappings and rig files."""
 
     name: str
     K: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
@@ -184,18 +190,18 @@ class _Matrices:
 
 
 def parse_camera(content: Mapping[str, Any], path: str) -> CameraConfig:
-    """Return the camera of a mapping.
+    """Return the camera that a mapping describes.
 
     Args:
         content: the fields of `CameraConfig`, or K, distortion and T_world_from_cam.
-        path: name of the mapping in errors, as "cameras[0]".
+        path: name of the mapping in error messages, such as "cameras[0]".
 
     Raises:
-        ConfigError: a field that does not exist, is missing or has a value that cannot work.
+        ConfigError: a field is unknown, missing or invalid.
     """
     if "T_world_from_cam" not in content:
         return from_mapping(CameraConfig, content, f"{path}.")
-    given = from_mapping(_Matrices, plain(content), f"{path}.")
+    given = from_mapping(_Matrices, convert_to_plain(content), f"{path}.")
     size = given.width_px, given.height_px
     K, T_world_from_cam = np.array(given.K), np.array(given.T_world_from_cam)
     camera = CameraConfig.from_matrices(
@@ -206,7 +212,7 @@ def parse_camera(content: Mapping[str, Any], path: str) -> CameraConfig:
 
 
 def make_lens(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens:
-    """Return the lens of OpenCV's coefficients; `ConfigError` for more than a model here has."""
+    """Return the lens with OpenCV's coefficients, or raise `ConfigError` if there are too many."""
     values = [float(each) for each in distortion]
     while values and values[-1] == 0.0:
         values.pop()
@@ -226,19 +232,19 @@ def axes_of(camera: CameraConfig) -> Rotations:
 
 
 def _is_pose(T: Transforms) -> bool:
-    """Return whether a transform (4, 4) is a rotation, no reflection, and a finite place."""
+    """Return whether a matrix (4, 4) consists of a rotation and a finite translation."""
     R = T[:3, :3]
     is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0.0
     return bool(is_rotation and np.isfinite(T).all() and np.allclose(T[3], [0.0, 0.0, 0.0, 1.0]))
 
 
 def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
-    """Raise the error of a camera with a value that cannot work."""
+    """Raise a `ConfigError` about an invalid value of a camera."""
     raise ConfigError(f"Camera {camera.name!r}: {expected}, got {got}.")
 
 
 def intrinsics(camera: CameraConfig) -> Floats:
-    """Return K (3, 3) [px], for pixels that are continuous from the image's corner."""
+    """Return K (3, 3) [px], for continuous pixel coordinates from the image's corner."""
     fx, fy = camera.focal_px or (_focal_px(camera),) * 2
     cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
@@ -261,7 +267,7 @@ def _focal_px(camera: CameraConfig) -> float:
 
 
 def _check_image(camera: CameraConfig, K: Floats) -> None:
-    """Raise an error unless intrinsics K (3, 3) and lens make an image to all of its edges."""
+    """Raise an error unless intrinsics K (3, 3) and lens fill the image up to all of its edges."""
     size = np.array([camera.width_px, camera.height_px])
     focal, centre = K[[0, 1], [0, 1]], K[:2, 2]
     if not (np.isfinite(K).all() and (focal > 0).all()):
@@ -269,7 +275,7 @@ def _check_image(camera: CameraConfig, K: Floats) -> None:
     if not ((centre > 0) & (centre < size)).all():
         _refuse(camera, f"the principal point must lie in the image of {size} px", centre)
     (cx, cy), (right, low) = centre, size
-    middles = np.array([[0, cy], [right, cy], [cx, 0], [cx, low]])  # of the edges
+    middles = np.array([[0, cy], [right, cy], [cx, 0], [cx, low]])  # midpoints of the edges
     if np.isnan(rays_cam(camera.lens, (middles - centre) / focal * (1 - 1e-9))).any():
         _refuse(
             camera,
@@ -285,8 +291,8 @@ MAKES: dict[str, CameraConfig] = {
     )
 }
 """Commercial cameras (`CameraConfig.from_make`). The GoPro HERO8 Black with its wide lens is the
-paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the fisheye
-polynomial with this coefficient does."""
+paper's camera: 118.2 x 69.5 degrees on 1920 x 1080 px. No pinhole camera with square pixels has
+both fields of view, but the fisheye polynomial with this coefficient does."""
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
@@ -298,9 +304,9 @@ def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
             a calibration of anipose, FreeMoCap, Caliscope or Pose2Sim.
 
     Raises:
-        ConfigError: the file cannot be read, or a field has a value that cannot work.
+        ConfigError: the file cannot be read, or a field is invalid.
     """
-    from hrc_env.geometry import calibrations  # it makes cameras
+    from hrc_env.geometry import calibrations  # calibrations imports this module
 
     content = read_toml(path)
     if calibrations.is_calibration(content):
@@ -323,6 +329,6 @@ def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
 
 
 def write_rig(path: Path | str, cameras: Sequence[CameraConfig]) -> None:
-    """Write a rig file with every field of every camera, from which `read_rig` reads the same."""
+    """Write a rig file with all fields of the cameras, from which `read_rig` restores them."""
     content = to_toml({"camera": [dataclasses.asdict(camera) for camera in cameras]})
     Path(path).write_text(content, encoding="utf-8")

@@ -1,10 +1,11 @@
-"""Cameras: points to pixels and pixels to rays.
+"""Cameras: projection of points to pixels, and of pixels to rays.
 
-A camera with a lens has two kinds of pixels: `pinhole` ones, in which projection is linear and
-which trackers use, and those of the `image`, which detectors find. Without a lens they are the
-same.
-Pixels are continuous from the image's top-left corner: pixel centres lie at half-integers. Camera
-axes are OpenCV's: +X right, +Y down, +Z forward.
+A camera with a lens has two kinds of pixel coordinates: `pinhole` pixels, which result from a
+linear projection and which trackers use, and `image` pixels, which detectors find. Without a lens,
+both are equal.
+
+Pixel coordinates are continuous from the image's top-left corner: pixel centres lie at
+half-integers. Camera axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
 from dataclasses import dataclass, replace
@@ -19,20 +20,20 @@ from hrc_env.geometry.rotations import look_at
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
-    """A camera at a known pose; a pinhole unless it has a lens."""
+    """A camera with a known pose: a pinhole camera unless it has a lens."""
 
     name: str
     """Name of the camera, unique in its rig."""
     K: Floats
     """(3, 3) intrinsics [px]."""
     T_world_from_cam: Transforms
-    """(4, 4) pose, of OpenCV's camera axes."""
+    """(4, 4) pose of OpenCV's camera axes in the world [m]."""
     width_px: int
     """Width of the image [px]."""
     height_px: int
     """Height of the image [px]."""
     lens: Lens | None = None
-    """Lens that distorts the image; None: a pinhole."""
+    """Lens that distorts the image; None for a pinhole camera."""
 
     @property
     def eye_world(self) -> Points3:
@@ -41,16 +42,16 @@ class PinholeCamera:
 
     @property
     def P(self) -> Floats:
-        """Projection (3, 4): homogeneous pinhole pixels are P @ (x, y, z, 1)."""
+        """Projection matrix (3, 4): homogeneous pinhole pixels are P @ (x, y, z, 1)."""
         R_cam_from_world = self.T_world_from_cam[:3, :3].T
         return self.K @ np.hstack([R_cam_from_world, -R_cam_from_world @ self.eye_world[:, None]])
 
 
 class Projection(NamedTuple):
-    """Points in the images of cameras."""
+    """Points projected into the images of cameras."""
 
     px: Points2
-    """(B, C, ..., 2) pinhole pixels, without meaning where the depth is not positive."""
+    """(B, C, ..., 2) pinhole pixels, which are meaningless where the depth is not positive."""
     depth_m: Floats
     """(B, C, ...) distance along the camera's axis [m]; negative behind the camera."""
 
@@ -63,15 +64,15 @@ def pinhole(
     width_px: int,
     height_px: int,
 ) -> PinholeCamera:
-    """Return a camera with square pixels.
+    """Return a pinhole camera with square pixels.
 
     Args:
         name: name of the camera.
-        eye_world: (3,) its place [m].
-        target_world: (3,) the point in the middle of its image [m].
+        eye_world: (3,) position of the camera [m].
+        target_world: (3,) point in the centre of the image [m].
         hfov_deg: horizontal field of view [degrees].
-        width_px: width of its image [px].
-        height_px: height of its image [px].
+        width_px: width of the image [px].
+        height_px: height of the image [px].
     """
     focal_px = width_px / 2 / np.tan(np.radians(hfov_deg) / 2)
     K = np.array([[focal_px, 0, width_px / 2], [0, focal_px, height_px / 2], [0, 0, 1.0]])
@@ -84,7 +85,7 @@ def pinhole(
 def resize(camera: PinholeCamera, width_px: int, height_px: int) -> PinholeCamera:
     """Return a camera with an image of another size.
 
-    The image is scaled to the new width, and cropped or extended around its middle to the height.
+    The image is scaled to the new width, and cropped or extended around its centre to the height.
     """
     K = camera.K * width_px / camera.width_px
     K[1, 2] += (height_px - camera.height_px * width_px / camera.width_px) / 2
@@ -101,8 +102,8 @@ def project(P: Floats, points_world: Points3) -> Projection:
     """Project points into every camera (Algorithm 1, line 11).
 
     Args:
-        P: (C, 3, 4) projections.
-        points_world: (B, ..., 3) [m].
+        P: (C, 3, 4) projection matrices.
+        points_world: (B, ..., 3) points [m].
     """
     rotated = np.einsum("cij,b...j->bc...i", P[:, :, :3], points_world)
     shape = (1, len(P)) + (1,) * (points_world.ndim - 2) + (3,)
@@ -113,9 +114,9 @@ def project(P: Floats, points_world: Points3) -> Projection:
 
 
 def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
-    """Return unit directions (..., 3) in the world frame of image pixels (..., 2).
+    """Return the viewing directions of image pixels (..., 2) as unit vectors (..., 3) in the world.
 
-    They are NaN of pixels at which the lens images nothing.
+    They are NaN for pixels outside the image circle of the lens.
     """
     if camera.lens is None:
         homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
@@ -127,37 +128,37 @@ def rays(camera: PinholeCamera, pixels: Points2) -> Points3:
 
 
 def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Return the image pixels of pinhole pixels (..., 2)."""
+    """Convert pinhole pixels (..., 2) to image pixels."""
     if camera.lens is None:
         return pixels
     return _denormalise(camera, distort(camera.lens, _normalise(camera, pixels)))
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Return the pinhole pixels of image pixels (..., 2), NaN where there are none."""
+    """Convert image pixels (..., 2) to pinhole pixels, NaN where there are none."""
     if camera.lens is None:
         return pixels
     return _denormalise(camera, undistort(camera.lens, _normalise(camera, pixels)))
 
 
 def pinhole_magnification(camera: PinholeCamera, pinhole_px: Points2) -> Floats | float:
-    """Return how many times longer a pinhole shows things at pixels (..., 2) than the image."""
+    """Return the ratio of a length in pinhole pixels to that in image pixels at points (..., 2)."""
     if camera.lens is None:
         return 1.0
     return magnification(camera.lens, _normalise(camera, pinhole_px))
 
 
 def _normalise(camera: PinholeCamera, pixels: Points2) -> Floats:
-    """Return pixels (..., 2) in focal lengths from the principal point."""
+    """Convert pixels (..., 2) to focal lengths from the principal point."""
     return (pixels - camera.K[:2, 2]) / camera.K[[0, 1], [0, 1]]
 
 
 def _denormalise(camera: PinholeCamera, normalised: Floats) -> Points2:
-    """Return the pixels of places (..., 2) in focal lengths from the principal point."""
+    """Convert positions (..., 2) in focal lengths from the principal point to pixels."""
     return normalised * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
 
 
 def inside_image(camera: PinholeCamera, pixels: Points2) -> Bools:
-    """Return which pixels (..., 2) lie in the image of a camera."""
+    """Return a mask (...) of the pixels (..., 2) that lie in the image of a camera."""
     u, v = pixels[..., 0], pixels[..., 1]
     return (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)

@@ -1,8 +1,8 @@
-"""Serial chains of hinges and slides: link frames, tool point, Jacobian and capsules, in numba.
+"""Kinematics of serial chains: link frames, tool point, Jacobian and capsules, in numba.
 
-A hinge turns about the z axis of its own frame, a slide moves along it. Link i's frame is joint
-i's frame moved by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= i}
-(parent_from_joint_j M_j(q_j)), where M is Rz of a hinge and Tz of a slide.
+A hinge rotates about the z axis of its joint frame, and a slide translates along it. The frame of
+link i is that of joint i, moved by q_i: T_world_from_link_i = T_world_from_base @ prod_{j <= i}
+(parent_from_joint_j M_j(q_j)), where M is Rz for a hinge and Tz for a slide.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
@@ -33,25 +33,25 @@ from hrc_env.core.typing import (
 class SerialChain:
     """The geometry and the limits of a robot, as in its data sheet.
 
-    Units are those of hinges; for a slide, read m in place of rad.
+    Units are those of hinges; for slides, rad stands for m.
     """
 
     T_world_from_base: Transforms
-    """(4, 4) where the robot is mounted, or where its slides begin."""
+    """(4, 4) pose of the robot's base, or of the origin of its slides [m]."""
     parent_from_joint: Transforms
-    """(N, 4, 4) each joint in the previous link (or the base) at q = 0."""
+    """(N, 4, 4) pose of each joint in the frame of the previous link (or the base) at q = 0 [m]."""
     link_from_tool: Transforms
-    """(4, 4) the tool point's frame in the last link."""
+    """(4, 4) pose of the tool frame in the frame of the last link [m]."""
     range_rad: Floats
-    """(N, 2) lowest and highest angle [rad]."""
+    """(N, 2) lower and upper joint limits [rad]."""
     velocity_limit_rad_s: Floats
-    """(N,) greatest speed [rad/s]."""
+    """(N,) maximum joint speeds [rad/s]."""
     slides: Bools
-    """(N,) which joints are slides; the others are hinges."""
+    """(N,) mask of the joints that are slides; the others are hinges."""
     capsule_link: Ints
     """(K,) index of the link that carries each capsule."""
     capsule_ends: Capsules
-    """(K, 2, 3) end points in the frame of that link [m]."""
+    """(K, 2, 3) end points of each capsule's axis in the frame of its link [m]."""
     capsule_radius_m: Floats
     """(K,) radii of the capsules [m]."""
 
@@ -65,43 +65,43 @@ class RobotPath(NamedTuple):
     """A robot at the end of a path, and its capsules along the path."""
 
     robot: RobotState
-    """State at the end."""
+    """State of the robot at the end of the path."""
     capsules_world: Capsules
-    """(..., T, K, 2, 3) end points of the capsules at every point of the path [m]."""
+    """(..., T, K, 2, 3) end points of the capsules' axes at every point of the path [m]."""
 
 
 def link_frames(chain: SerialChain, q: JointAngles) -> Transforms:
-    """Return the frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
-    angles = flat(_check_joints(chain, "q", q), 1)
+    """Return the poses (..., N, 4, 4) of all links in the world, at joint angles q (..., N)."""
+    angles = flatten_axes(_check_joints(chain, "q", q), 1)
     frames = np.empty((len(angles), chain.n_joints, 4, 4))
     _write_frames(angles, chain.slides, chain.T_world_from_base, chain.parent_from_joint, frames)
     return frames.reshape(*np.shape(q)[:-1], chain.n_joints, 4, 4)
 
 
 def tool_frame(chain: SerialChain, q: JointAngles) -> Transforms:
-    """Return the tool's frame, (..., 4, 4) world_from_tool, at angles q (..., N)."""
+    """Return the pose (..., 4, 4) of the tool frame in the world, at joint angles q (..., N)."""
     return link_frames(chain, q)[..., -1, :, :] @ chain.link_from_tool
 
 
 def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
-    """Return the tool's velocity per joint velocity at q (..., N).
+    """Return the Jacobian of the tool point's velocity at joint angles q (..., N).
 
     Returns:
-        (..., 3, N) in the world frame [m/rad; of a slide m/m].
+        (..., 3, N) in the world frame [m/rad; m/m for a slide].
     """
-    frames = flat(link_frames(chain, q), 3)
+    frames = flatten_axes(link_frames(chain, q), 3)
     result = np.empty((len(frames), 3, chain.n_joints))
     _write_jacobian(frames, chain.slides, chain.link_from_tool, result)
     return result.reshape(*np.shape(q)[:-1], 3, chain.n_joints)
 
 
 def angular_jacobian(chain: SerialChain, q: JointAngles) -> Floats:
-    """Return the tool's turn rate per joint velocity, (..., 3, N) in the world frame."""
+    """Return the Jacobian (..., 3, N) of the tool's angular velocity, in the world frame."""
     return np.moveaxis(link_frames(chain, q)[..., :3, 2], -1, -2) * ~chain.slides
 
 
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
-    """Return the robot's collision capsules, (..., K, 2, 3) end points in the world frame [m]."""
+    """Return the end points (..., K, 2, 3) of the robot's collision capsules in the world [m]."""
     return _place_capsules(chain, link_frames(chain, q))
 
 
@@ -114,15 +114,15 @@ def robot_path(chain: SerialChain, q_path: JointAngles, qd: JointVelocities) -> 
     """Return the state of a robot at the end of a path, and its capsules along the path.
 
     Args:
-        chain: the robot's geometry.
+        chain: geometry of the robot.
         q_path: (..., T, N) joint angles at the points of the path.
-        qd: (..., N) joint velocities at its end.
+        qd: (..., N) joint velocities at the end of the path.
     """
     frames = link_frames(chain, q_path)
     ends = _place_capsules(chain, frames)
-    rates = flat(_check_joints(chain, "qd", qd), 1)
+    rates = flatten_axes(_check_joints(chain, "qd", qd), 1)
     lead = np.shape(qd)[:-1]
-    last = flat(frames[..., -1, :, :, :], 3)
+    last = flatten_axes(frames[..., -1, :, :, :], 3)
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
     _write_tool_motion(last, chain.slides, rates, chain.link_from_tool, tool_world, velocity)
     axes = frames[..., -1, -1, :3, :3] @ chain.link_from_tool[:3, :3]
@@ -140,16 +140,16 @@ def robot_path(chain: SerialChain, q_path: JointAngles, qd: JointVelocities) -> 
 
 
 def _place_capsules(chain: SerialChain, frames: Transforms) -> Capsules:
-    """Return the capsules (..., K, 2, 3) on links with frames (..., N, 4, 4)."""
+    """Return the capsules (..., K, 2, 3) in the world, given the links' poses (..., N, 4, 4)."""
     shape = chain.capsule_ends.shape
-    stacked = flat(frames, 3)
+    stacked = flatten_axes(frames, 3)
     ends = np.empty((len(stacked), *shape))
     _write_capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
     return ends.reshape(*frames.shape[:-3], *shape)
 
 
 def _check_joints(chain: SerialChain, name: str, values: Floats) -> Floats:
-    """Return values (..., N) of the joints; `ConfigError` for another number of joints."""
+    """Return values (..., N) as an array; raise `ConfigError` if N is not the number of joints."""
     array = np.asarray(values, float)
     check_shape(f"The last axis of {name}", array.shape[-1:], (chain.n_joints,), "one per joint")
     return array
@@ -163,14 +163,14 @@ def _write_frames(
     parent_from_joint: Transforms,
     frames: Transforms,
 ) -> None:
-    """Write the frames (B, N, 4, 4) of the links at q (B, N); see `SerialChain`."""
+    """Compute the poses `frames` (B, N, 4, 4) of the links at q (B, N); see `SerialChain`."""
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
             parent = base if i == 0 else frames[b, i - 1]
             fixed, frame = parent_from_joint[i], frames[b, i]
             turn, way = (0.0, q[b, i]) if slides[i] else (q[b, i], 0.0)
             c, s = math.cos(turn), math.sin(turn)
-            for row in range(3):  # the last row of a product of transforms is known
+            for row in range(3):  # the last row of a transform is constant
                 p0, p1, p2 = parent[row, 0], parent[row, 1], parent[row, 2]
                 x = p0 * fixed[0, 0] + p1 * fixed[1, 0] + p2 * fixed[2, 0]
                 y = p0 * fixed[0, 1] + p1 * fixed[1, 1] + p2 * fixed[2, 1]
@@ -186,7 +186,7 @@ def _write_frames(
 
 @kernel
 def _transform_point(frame: Transforms, point: Floats) -> Vector3:
-    """Return a point (3,) of a frame (4, 4) in the parent frame [m]."""
+    """Transform a point (3,) from a frame with pose (4, 4) to the parent frame [m]."""
     x, y, z = point[0], point[1], point[2]
     return Vector3(
         frame[0, 3] + (frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z),
@@ -197,13 +197,14 @@ def _transform_point(frame: Transforms, point: Floats) -> Vector3:
 
 @kernel
 def lever(frame: Transforms, is_slide: bool, point: Floats | Vector3) -> Vector3:
-    """Return the velocity of a point per velocity of a joint.
+    """Return the derivative of a point's velocity with respect to the velocity of a joint.
+
+    It is the joint's axis for a slide, and the cross product axis x (point - origin) for a hinge.
 
     Args:
-        frame: (4, 4) the joint's frame.
-        is_slide: whether the joint is a slide: the result is then its axis; of a hinge it is the
-            axis times (point - origin).
-        point: (3,) [m].
+        frame: (4, 4) pose of the joint's frame.
+        is_slide: whether the joint is a slide.
+        point: (3,) position of the point [m].
     """
     if is_slide:
         return Vector3(frame[0, 2], frame[1, 2], frame[2, 2])
@@ -216,7 +217,7 @@ def lever(frame: Transforms, is_slide: bool, point: Floats | Vector3) -> Vector3
 def _write_jacobian(
     frames: Transforms, slides: Bools, link_from_tool: Transforms, out: Floats
 ) -> None:
-    """Write the Jacobian (B, 3, N) of the tool point; column i is of joint i."""
+    """Compute the Jacobian `out` (B, 3, N) of the tool point; column i belongs to joint i."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
         point = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
@@ -234,7 +235,7 @@ def _write_tool_motion(
     tool_world: Points3,
     velocity_world: Velocities3,
 ) -> None:
-    """Write the tool points (B, 3) [m] and their velocities (B, 3) [m/s]."""
+    """Compute the positions (B, 3) [m] and velocities (B, 3) [m/s] of the tool points."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
         tool = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
@@ -250,7 +251,7 @@ def _write_tool_motion(
 def _write_capsules(
     frames: Transforms, link: Ints, ends_link: Capsules, ends_world: Capsules
 ) -> None:
-    """Write the capsules (B, K, 2, 3) of links with frames (B, N, 4, 4) in the world frame [m]."""
+    """Compute the capsules `ends_world` (B, K, 2, 3) [m] of links with poses (B, N, 4, 4)."""
     for b in range(frames.shape[0]):
         for k in range(len(link)):
             for e in range(2):

@@ -1,6 +1,7 @@
-"""Distances between capsules (segments with a radius) and the points where they are closest.
+"""Distances between capsules (segments with a radius), and their closest points.
 
-The closest points of two segments follow Ericson, Real-Time Collision Detection (2005), 5.1.9.
+The closest points of two segments are computed as in Ericson, Real-Time Collision Detection (2005),
+5.1.9.
 """
 
 import math
@@ -9,26 +10,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3
 
 SLACK_M = 1e-9
-"""Addition to the bounds of bounding spheres, far above their rounding errors [m]."""
+"""Tolerance of the bounds by bounding spheres, far greater than their rounding errors [m]."""
 _PARALLEL = 1e-13
-"""Squared sine of the angle below which segments count as parallel: a micrometre over their
-length."""
+"""Squared sine of the angle below which segments are considered parallel; they then diverge by less
+than a micrometre per metre."""
 _ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
-"""(K, 2, 2) the two joints with each end in their middle; twice the same for an end at a joint."""
+"""(K, 2, 2) two joints with each end at their midpoint; for an end at a joint, that joint twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """The smallest gap between two sets of capsules, over leading axes (...)."""
+    """The smallest distance between two sets of capsules, for any leading axes (...)."""
 
     distance_m: Floats
-    """(...,) distance between the surfaces [m]; negative inside, infinite of an empty set."""
+    """(...,) distance between the surfaces [m]; negative for overlaps, infinite for empty sets."""
     point_a_world: Points3
     """(..., 3) closest point on the axis of the nearest capsule of the first set [m]."""
     point_b_world: Points3
@@ -39,29 +40,34 @@ class ClosestPoints(NamedTuple):
     """The closest points of two segments."""
 
     squared_distance: float
-    """Squared distance between them [m^2]."""
+    """Squared distance between the closest points [m^2]."""
     s: float
-    """Place on the first segment, from 0 at its start to 1 at its end."""
+    """Parameter of the point on the first segment, from 0 at the start to 1 at the end."""
     t: float
-    """Place on the second segment, from 0 to 1."""
+    """Parameter of the point on the second segment, from 0 at the start to 1 at the end."""
 
 
 def least_separation(
     capsules_a: Capsules, radius_a_m: Floats, capsules_b: Capsules, radius_b_m: Floats
 ) -> Separation:
-    """Return the smallest gap between any capsule of one set and any of another.
+    """Return the smallest distance between any capsule of one set and any capsule of another.
 
     Args:
-        capsules_a: (..., Ka, 2, 3) end points [m].
-        radius_a_m: (..., Ka) with the first of its leading axes, or none [m].
-        capsules_b: (..., Kb, 2, 3) with the same leading axes, or with more after them: each first
-            set is then compared with several second ones [m].
-        radius_b_m: (..., Kb) likewise [m]; or those of one body where the second sets are several.
+        capsules_a: (..., Ka, 2, 3) end points of the first set [m].
+        radius_a_m: (..., Ka) radii of the first set, with all, some of the first or none of the
+            leading axes of `capsules_a` [m].
+        capsules_b: (..., Kb, 2, 3) end points of the second set [m]. The leading axes are those of
+            `capsules_a`, or these and further ones; each first set is then compared with several
+            second sets.
+        radius_b_m: (..., Kb) radii of the second set [m], likewise; if there are several second
+            sets, the radii of a single body suffice.
     """
     lead = capsules_b.shape[:-3]
-    flat_a, flat_b = flat(capsules_a, 3), flat(capsules_b, 3)
+    flat_a, flat_b = flatten_axes(capsules_a, 3), flatten_axes(capsules_b, 3)
     gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
-    _find_narrowest(flat_a, flat(radius_a_m, 1), flat_b, flat(radius_b_m, 1), gap, points)
+    _find_narrowest(
+        flat_a, flatten_axes(radius_a_m, 1), flat_b, flatten_axes(radius_b_m, 1), gap, points
+    )
     points = points.reshape(*lead, 2, 3)
     return Separation(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
 
@@ -72,9 +78,9 @@ def closest_parameters(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Closes
 
     Args:
         p0: (3,) start of the first segment [m].
-        p1: (3,) its end.
+        p1: (3,) end of the first segment [m].
         q0: (3,) start of the second segment [m].
-        q1: (3,) its end.
+        q1: (3,) end of the second segment [m].
     """
     ux, uy, uz = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
     vx, vy, vz = q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]
@@ -106,9 +112,10 @@ def closest_parameters(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Closes
 def _find_narrowest(
     a: Capsules, radius_a: Floats, b: Capsules, radius_b: Floats, gap: Floats, points: Points3
 ) -> None:
-    """Write the gaps (B,) between sets of capsules and the closest points (B, 2, 3).
+    """Compute the distances `gap` (B,) of sets of capsules and the closest points (B, 2, 3).
 
-    Bounding spheres bound the gaps from below: only pairs that may be nearest are measured.
+    Bounding spheres give lower bounds of the distances, and only pairs of capsules that may be the
+    nearest are evaluated.
     """
     n_a, n_b = a.shape[1], b.shape[1]
     per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
@@ -131,9 +138,9 @@ def _find_narrowest(
 
 @kernel
 def _bound_capsules(capsules: Capsules, radius: Floats, spheres: Floats) -> None:
-    """Write bounding spheres (5, K) of capsules (K, 2, 3): centre, radius and capsule radius [m].
+    """Compute bounding spheres (5, K) of capsules: centre, radius and the capsule's radius [m].
 
-    Radii repeat where there are fewer of them than capsules: those of one body for several.
+    If there are fewer radii than capsules, the radii are those of a body and repeat for each body.
     """
     for k in range(len(capsules)):
         squared, capsule_radius = 0.0, radius[k % len(radius)]
@@ -153,17 +160,18 @@ def _search_pairs(
     bounds: Floats,
     points: Points3,
 ) -> float:
-    """Return the smallest gap between capsules of two sets, and write the closest points (2, 3).
+    """Return the smallest distance between two sets of capsules, and find the closest points.
 
-    The search begins with the pair of the least lower bound; of equal gaps the first pair counts.
+    The search begins with the pair with the smallest lower bound; if distances are equal, the first
+    pair is used.
 
     Args:
-        a: (Ka, 2, 3) the first set [m].
-        radius_a: (Ka,) [m].
-        b: (Kb, 2, 3) the second set [m].
-        radius_b: (Kb,) [m].
-        bounds: (Ka, Kb) lower bounds of the gaps [m].
-        points: (2, 3) is filled [m].
+        a: (Ka, 2, 3) capsules of the first set [m].
+        radius_a: (Ka,) radii of the first set [m].
+        b: (Kb, 2, 3) capsules of the second set [m].
+        radius_b: (Kb,) radii of the second set [m].
+        bounds: (Ka, Kb) lower bounds of the distances [m].
+        points: (2, 3) output: the closest points on the axes [m].
     """
     likely_k, likely_m, low, best = 0, 0, np.inf, np.inf
     for k in range(len(a)):
@@ -191,9 +199,9 @@ def segments(joints_world: Points3) -> Capsules:
     """Return the axes of the capsules of a body with joints (..., 15, 3) [m].
 
     Returns:
-        (..., 16, 2, 3) end points, the hands last [m]; the radii are `SEGMENT_RADIUS_M`.
+        (..., 16, 2, 3) end points, with the hands last [m]; the radii are `SEGMENT_RADIUS_M`.
     """
-    joints = flat(joints_world, 2)
+    joints = flatten_axes(joints_world, 2)
     ends = np.empty((len(joints), len(SEGMENT_RADIUS_M), 2, 3))
     _write_segments(joints, ends)
     return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])
@@ -201,7 +209,7 @@ def segments(joints_world: Points3) -> Capsules:
 
 @kernel
 def _write_segments(joints: Points3, ends: Capsules) -> None:
-    """Write the segments (B, 16, 2, 3) of bodies with joints (B, 15, 3) [m]."""
+    """Compute the segments `ends` (B, 16, 2, 3) of bodies with joints (B, 15, 3) [m]."""
     for b in range(joints.shape[0]):
         for k in range(len(_ENDS)):
             for e in range(2):

@@ -1,15 +1,16 @@
-"""Lenses: where light that a pinhole would show at one place arrives in the real image.
+"""Distortion of images by lenses, relative to a pinhole camera.
 
-Places are normalised: pixels less the principal point, over the focal lengths. "Undistorted" places
-are the pinhole's, "distorted" ones those in the image. Two models, with OpenCV's coefficients:
+Points are in normalised image coordinates: pixels minus the principal point, divided by the focal
+lengths. "Undistorted" points are those of the pinhole camera, "distorted" points those in the real
+image. There are two models, with OpenCV's coefficients:
 
 | model | distorted from undistorted |
 |---|---|
 | `brown_conrady` | radius times 1 + k1 r^2 + k2 r^4 + k3 r^6, and decentring p1, p2 (Brown 1966) |
 | `kannala_brandt` | angle t from the axis at radius t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) |
 
-(Kannala and Brandt 2006, in OpenCV's `fisheye`.) A polynomial folds the image over where it no
-longer grows; light from beyond that angle is not imaged.
+The second is that of Kannala and Brandt (2006) and of OpenCV's `fisheye` module. Beyond the angle
+at which a polynomial stops growing, it would fold the image over; light from there is not imaged.
 
 Kernels take a lens as a row (8,): model, five coefficients, `LIMIT` and `FOLD` (see `lens_row`).
 """
@@ -21,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
@@ -32,18 +33,18 @@ COEFFICIENTS: dict[str, tuple[str, ...]] = {
     "brown_conrady": ("k1", "k2", "p1", "p2", "k3"),
     "kannala_brandt": ("k1", "k2", "k3", "k4"),
 }
-"""Names of each model's coefficients, in order; those that are left out are 0."""
+"""Names of each model's coefficients, in order; omitted coefficients are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
-"""Numbers of the models in a lens' row."""
+"""Numbers of the models in the row of a lens."""
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row: the distorted radius beyond which nothing is imaged [focal lengths], and
-the angle from the axis that belongs to it [rad]."""
+"""Columns of a lens's row: the distorted radius beyond which nothing is imaged [focal lengths], and
+the corresponding angle from the optical axis [rad]."""
 WIDEST_RAD = math.radians(175.0)
-"""Greatest angle from the axis at which a fisheye lens images [rad]."""
+"""Greatest angle from the optical axis that a fisheye lens can image [rad]."""
 PINHOLE_RAD = math.radians(80.0)
-"""Greatest angle from the axis that has a place in a pinhole's image [rad]."""
+"""Greatest angle from the optical axis at which undistorted points are defined [rad]."""
 FAR = 1e6
-"""Factor by which places that a lens does not image are moved away."""
+"""Factor by which points that a lens does not image are moved away from the image's centre."""
 _SAMPLES = 4096
 _NEWTON_STEPS = 12
 _STEP = 1e-5
@@ -57,8 +58,8 @@ class Lens:
     model: str = "none"
     """Name of the model: "none", "brown_conrady" or "kannala_brandt"."""
     coefficients: tuple[float, ...] = ()
-    """Coefficients of the model in OpenCV's order: k1, k2, p1, p2, k3 of "brown_conrady", k1, k2,
-    k3, k4 of "kannala_brandt"; those that are left out are 0."""
+    """Coefficients of the model in OpenCV's order: k1, k2, p1, p2, k3 for "brown_conrady", and k1,
+    k2, k3, k4 for "kannala_brandt"; omitted coefficients are 0."""
 
     def __post_init__(self) -> None:
         check_names("lens model", [self.model], COEFFICIENTS)
@@ -71,17 +72,17 @@ class Lens:
 
 
 class ImagePoint(NamedTuple):
-    """A place in the image plane, in focal lengths from the principal point."""
+    """A point in the image plane, relative to the principal point."""
 
     x: float
-    """Distance to the right [focal lengths]."""
+    """Coordinate to the right [focal lengths]."""
     y: float
-    """Distance down [focal lengths]."""
+    """Coordinate downwards [focal lengths]."""
 
 
 @functools.lru_cache(maxsize=64)
 def lens_row(lens: Lens) -> Floats:
-    """Return a lens as numbers (8,) for kernels: model, coefficients, `LIMIT` and `FOLD`."""
+    """Return the row (8,) of a lens for kernels: model, coefficients, `LIMIT` and `FOLD`."""
     row = np.zeros(FOLD + 1)
     row[0] = list(COEFFICIENTS).index(lens.model)
     row[1 : 1 + len(lens.coefficients)] = lens.coefficients
@@ -96,74 +97,74 @@ def lens_row(lens: Lens) -> Floats:
 
 
 def distort(lens: Lens, undistorted: Floats) -> Floats:
-    """Return the distorted places of undistorted ones (..., 2)."""
-    places = flat(np.asarray(undistorted, float), 1)
+    """Convert undistorted points (..., 2) to distorted ones."""
+    places = flatten_axes(np.asarray(undistorted, float), 1)
     out = np.empty(places.shape)
     _distort_all(lens_row(lens), places, out)
     return out.reshape(np.shape(undistorted))
 
 
 def magnification(lens: Lens, undistorted: Floats) -> Floats:
-    """Return how many times longer a pinhole shows a short line than the lens does.
+    """Return the ratio of a short line's length in the pinhole image to that in the real image.
 
     Args:
         lens: the lens.
-        undistorted: (..., 2) places of the line in the pinhole's image.
+        undistorted: (..., 2) position of the line in the pinhole image.
 
     Returns:
-        (...,) mean of the factors in both directions.
+        (...,) geometric mean of the ratios in both directions.
     """
-    places = flat(np.asarray(undistorted, float), 1)
+    places = flatten_axes(np.asarray(undistorted, float), 1)
     out = np.empty(len(places))
     _magnify_all(lens_row(lens), places, out)
     return out.reshape(np.shape(undistorted)[:-1])
 
 
 def undistort(lens: Lens, distorted: Floats) -> Floats:
-    """Return the undistorted places of distorted ones (..., 2); NaN beyond `PINHOLE_RAD`."""
+    """Convert distorted points (..., 2) to undistorted ones, NaN beyond `PINHOLE_RAD`."""
     ray = rays_cam(lens, distorted)
     ahead = ray[..., 2:] > math.cos(PINHOLE_RAD)
     return np.where(ahead, ray[..., :2] / np.where(ahead, ray[..., 2:], 1.0), np.nan)
 
 
 def rays_cam(lens: Lens, distorted: Floats) -> Points3:
-    """Return unit directions (..., 3) in camera axes of distorted places (..., 2), NaN of none."""
-    places = flat(np.asarray(distorted, float), 1)
+    """Return the unit directions (..., 3) in camera axes of distorted points (..., 2), or NaN."""
+    places = flatten_axes(np.asarray(distorted, float), 1)
     out = np.empty((len(places), 3))
     _cast_rays(lens_row(lens), places, out)
     return out.reshape(*np.shape(distorted)[:-1], 3)
 
 
 def distorted_radius(lens: Lens, angle_rad: float) -> float:
-    """Return where light at an angle to the axis arrives [focal lengths]; NaN beyond the lens."""
+    """Return the distorted radius of light at an angle to the axis [focal lengths], or NaN."""
     row = lens_row(lens)
     return float(_radius_at(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 
 
 @kernel
 def _distort_all(row: Floats, places: Floats, out: Floats) -> None:
-    """Write the distorted places (n, 2) of undistorted ones (n, 2)."""
+    """Convert undistorted points (n, 2) to distorted ones, `out` (n, 2)."""
     for i in range(len(places)):
         out[i, 0], out[i, 1] = distort_point(row, places[i, 0], places[i, 1])
 
 
 @kernel
 def _magnify_all(row: Floats, places: Floats, out: Floats) -> None:
-    """Write the magnification (n,) at undistorted places (n, 2)."""
+    """Compute the magnification `out` (n,) at undistorted points (n, 2)."""
     for i in range(len(places)):
         out[i] = magnification_at(row, places[i, 0], places[i, 1])
 
 
 @kernel
 def _cast_rays(row: Floats, places: Floats, out: Points3) -> None:
-    """Write unit directions (n, 3) in camera axes of distorted places (n, 2)."""
+    """Compute unit directions `out` (n, 3) in camera axes of distorted points (n, 2)."""
     for i in range(len(places)):
         out[i, 0], out[i, 1], out[i, 2] = _unit_ray(row, places[i, 0], places[i, 1])
 
 
 @kernel
 def distort_point(row: Floats, x: float, y: float) -> ImagePoint:
-    """Return where a lens images a place of a pinhole's image; far away if it does not."""
+    """Return the distorted position of an undistorted point; far away if it is not imaged."""
     squared = x * x + y * y
     if row[0] != NONE and squared > math.tan(row[FOLD]) ** 2 and row[FOLD] < 0.5 * math.pi:
         return ImagePoint(FAR * x, FAR * y)
@@ -183,7 +184,7 @@ def distort_point(row: Floats, x: float, y: float) -> ImagePoint:
 
 @kernel
 def magnification_at(row: Floats, x: float, y: float) -> float:
-    """Return the `magnification` of a lens at one undistorted place."""
+    """Return the `magnification` of a lens at one undistorted point."""
     if row[0] == NONE:
         return 1.0
     left, right = distort_point(row, x - _STEP, y), distort_point(row, x + _STEP, y)
@@ -195,7 +196,7 @@ def magnification_at(row: Floats, x: float, y: float) -> float:
 
 @kernel
 def _radius_at(row: Floats, angle: float) -> float:
-    """Return the radius at which light at an angle [rad] to the axis arrives [focal lengths]."""
+    """Return the distorted radius of light at an angle [rad] to the axis [focal lengths]."""
     if row[0] == KANNALA_BRANDT:
         s = angle * angle
         return angle * (1.0 + s * (row[1] + s * (row[2] + s * (row[3] + s * row[4]))))
@@ -208,7 +209,7 @@ def _radius_at(row: Floats, angle: float) -> float:
 
 @kernel
 def _unit_ray(row: Floats, x: float, y: float) -> Vector3:
-    """Return the unit direction of a distorted place in camera axes; NaN where there is none."""
+    """Return the unit direction of a distorted point in camera axes, or NaN if it has none."""
     radius = math.sqrt(x * x + y * y)
     if not radius < row[LIMIT]:
         return Vector3(np.nan, np.nan, np.nan)
@@ -228,9 +229,9 @@ def _unit_ray(row: Floats, x: float, y: float) -> Vector3:
 
 @kernel
 def _solve_angle(row: Floats, radius: float) -> float:
-    """Return the angle [rad] whose light arrives at a radius below the limit.
+    """Return the angle to the axis [rad] of light that arrives at a radius below the limit.
 
-    Newton's method, with bisection where a step leaves the bracket.
+    The equation is solved by Newton's method, with bisection if a step leaves the bracket.
     """
     low, high = 0.0, row[FOLD]
     angle = min(radius, 0.5 * high)
@@ -250,14 +251,14 @@ def _solve_angle(row: Floats, radius: float) -> float:
 
 @kernel
 def _remove_decentring(row: Floats, x: float, y: float, u: float, v: float) -> ImagePoint:
-    """Return the undistorted place of a distorted one, by Newton's method.
+    """Return the undistorted position of a distorted point, by Newton's method.
 
     Args:
-        row: (8,) the lens.
-        x: distorted place.
-        y: distorted place.
-        u: first guess of the undistorted place.
-        v: first guess of the undistorted place.
+        row: (8,) row of the lens.
+        x: first coordinate of the distorted point.
+        y: second coordinate of the distorted point.
+        u: initial guess of the undistorted point's first coordinate.
+        v: initial guess of the undistorted point's second coordinate.
     """
     for _ in range(_NEWTON_STEPS):
         at = distort_point(row, u, v)

@@ -1,4 +1,4 @@
-"""Lines of sight: cameras as centres and rays, and where two rays pass each other."""
+"""Lines of sight of cameras, and the points at which two lines are closest to each other."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -10,16 +10,16 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
 MIN_CROSSING = 0.1
-"""Sine of the smallest angle between two lines that fixes a point."""
+"""Sine of the smallest angle between two lines at which their closest points are well defined."""
 
 
 class Camera:
-    """A pinhole camera of the rig, derived from its projection."""
+    """A pinhole camera of the rig, derived from its projection matrix."""
 
     P: Annotated[Floats, (3, 4)]
-    """Projection from homogeneous world coordinates to homogeneous pixels."""
+    """Projection matrix from homogeneous world coordinates to homogeneous pixels."""
     back: Annotated[Floats, (3, 3)]
-    """Matrix from homogeneous pixels to directions in the world."""
+    """Matrix that converts homogeneous pixels to directions in the world."""
     eye: Annotated[Floats, (3,)]
     """Optical centre in the world frame [m]."""
     focal: float
@@ -31,18 +31,18 @@ CAMERA = dtype_of(Camera)
 
 
 class Crossing(NamedTuple):
-    """The places at which two lines pass each other."""
+    """The points at which two lines are closest to each other."""
 
     distance_1: float
-    """Distance along the first line [m]; negative: behind its origin."""
+    """Distance of the point along the first line [m]; negative if behind the line's origin."""
     distance_2: float
-    """Distance along the second line [m]."""
+    """Distance of the point along the second line [m]; negative if behind the line's origin."""
     squared_gap: float
-    """Squared distance between the lines [m^2]; infinite of lines that are nearly parallel."""
+    """Squared distance between the points [m^2]; infinite if the lines are nearly parallel."""
 
 
 def cameras_of(P: Floats) -> Records1[Camera]:
-    """Return the cameras (C,) of projections P (C, 3, 4)."""
+    """Return the cameras (C,) with projection matrices P (C, 3, 4)."""
     cameras = make_records(Camera, len(P))
     model_cameras(np.ascontiguousarray(P, np.float64), cameras)
     return cameras
@@ -50,7 +50,7 @@ def cameras_of(P: Floats) -> Records1[Camera]:
 
 @kernel
 def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
-    """Fill in cameras (C,) from their projections P (C, 3, 4)."""
+    """Fill in the fields of cameras (C,) from their projection matrices P (C, 3, 4)."""
     for c in range(len(P)):
         a, camera, inverse = P[c], cameras[c], cameras[c].back
         for i in range(3):
@@ -78,14 +78,14 @@ def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
 def nearest_places(
     eye_1: Floats, ray_1: Floats, eye_2: Floats, ray_2: Floats, middle: Floats
 ) -> Crossing:
-    """Return where two lines pass each other, and write the middle between these places.
+    """Find the points at which two lines are closest to each other, and their midpoint.
 
     Args:
         eye_1: (3,) origin of the first line [m].
         ray_1: (3,) unit direction of the first line.
         eye_2: (3,) origin of the second line [m].
         ray_2: (3,) unit direction of the second line.
-        middle: (3,) is filled [m], unless the lines are nearly parallel.
+        middle: (3,) output: the midpoint [m]; unchanged if the lines are nearly parallel.
     """
     cosine, a, b = 0.0, 0.0, 0.0
     for i in range(3):
@@ -106,13 +106,13 @@ def nearest_places(
 
 @kernel
 def look(back: Floats, u: float, v: float, ray: Floats) -> None:
-    """Write the unit direction of a pixel in the world frame.
+    """Compute the viewing direction of a pixel in the world frame.
 
     Args:
-        back: (3, 3) as of `Camera`.
+        back: (3, 3) matrix `Camera.back`.
         u: column of the pixel [px].
         v: row of the pixel [px].
-        ray: (3,) is filled.
+        ray: (3,) output: the unit direction.
     """
     length = 0.0
     for i in range(3):

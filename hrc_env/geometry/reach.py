@@ -1,4 +1,4 @@
-"""The places that the tool of a robot must reach, and a check that the arm is long enough."""
+"""Positions that the tool of a robot must reach, and a check that the arm is long enough."""
 
 import itertools
 from collections.abc import Iterable
@@ -19,38 +19,39 @@ Triple = tuple[float, float, float]
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ReachTarget:
-    """A place that the tool point of a robot must reach."""
+    """A position that the tool point of a robot must reach."""
 
     name: str
-    """Name of the place with its article, for messages."""
+    """Name of the target with its article, for error messages."""
     place_world: Triple | Points3
-    """Position of the place in the world frame [m]."""
+    """Position of the target in the world frame [m]."""
     along_world: Triple | None = None
-    """Unit vector along which the tool points at the place; None: any direction."""
+    """Unit vector along which the tool points at the target; None if any direction is allowed."""
     within_m: float = 0.0
-    """Distance from the place that is near enough [m]."""
+    """Tolerance: greatest distance from the target that counts as reached [m]."""
 
 
 class WristReach(NamedTuple):
-    """The sphere that contains the last joint of an arm."""
+    """The sphere around an arm's second joint that contains all positions of its last joint."""
 
     shoulder_world: Points3
-    """(3,) position of the second joint [m]."""
+    """(3,) position of the second joint in the world frame [m]."""
     radius_m: float
     """Greatest distance of the last joint from the second one [m]."""
 
 
 def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
-    """Raise an error if an arm is too short for one of the places.
+    """Raise an error if an arm is too short for one of the targets.
 
     Args:
-        task: id of the task, for the message.
-        robot: name of the robot, for the message.
-        chain: its geometry; robots with slides pass.
-        targets: the places.
+        task: id of the task, for the error message.
+        robot: name of the robot, for the error message.
+        chain: geometry of the robot; robots with slides are not checked.
+        targets: the targets.
 
     Raises:
-        ConfigError: the last joint would have to be farther from the second one than it can be.
+        ConfigError: a target requires a greater distance between the second and the last joint than
+            is possible.
     """
     if chain.slides.any():
         return
@@ -75,8 +76,8 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
 def wrist_reach(chain: SerialChain) -> WristReach:
     """Return the reach of an arm's last joint.
 
-    It is the greatest of all poses with joints at right angles; arms of the usual kinds are
-    longest in one of these.
+    It is the greatest distance over all poses with joint angles of multiples of 90 degrees; arms of
+    the usual designs reach farthest in one of these poses.
     """
     steps = 0.5 * np.pi * np.arange(-2, 3)
     between = [

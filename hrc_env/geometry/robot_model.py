@@ -1,4 +1,4 @@
-"""The properties of a robot that a shield needs, beside the state that its encoders measure."""
+"""The properties of a robot that a shield needs, apart from the state measured by the encoders."""
 
 from dataclasses import dataclass
 
@@ -13,20 +13,20 @@ from hrc_env.geometry.chains import SerialChain
 class RobotModel:
     """A robot's geometry, the limits of its commands and its effective mass.
 
-    Units are those of hinges; for a slide, read m in place of rad.
+    Units are those of hinges; for slides, rad stands for m.
     """
 
     chain: SerialChain
     """Geometry of the links, with the collision capsules."""
     fastest_rad_s: Floats
-    """(N,) the greatest velocity that an action can command for each joint [rad/s]."""
+    """(N,) maximum velocity that an action can command for each joint [rad/s]."""
     slew_rad_s2: Floats
-    """(N,) the greatest rate of change of each joint's commanded velocity [rad/s^2]."""
+    """(N,) maximum rate of change of each joint's commanded velocity [rad/s^2]."""
     mass_kg: float
-    """Effective mass in a collision without a load [kg]: half of an arm's moving mass (ISO/TS
-    15066, A.3), all of the mass of a mobile base."""
+    """Effective mass in a collision without a load [kg]: half the moving mass of an arm (ISO/TS
+    15066, A.3), or the total mass of a mobile base."""
     load_kg: Floats
-    """(O,) masses of the task's loose objects [kg]."""
+    """(O,) mass of each loose object of the task [kg]."""
 
     def __post_init__(self) -> None:
         for name in ("fastest_rad_s", "slew_rad_s2"):

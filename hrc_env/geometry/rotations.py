@@ -1,4 +1,4 @@
-"""Rotations as matrices, over any leading axes, and by a unit quaternion (scalar first)."""
+"""Rotations as matrices, for any leading axes, and by unit quaternions (scalar first)."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz, Rotations, Vec
 
 
 def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
-    """Return the rotations (..., 3, 3) about "x", "y" or "z" by angles of any shape."""
+    """Return the rotations (..., 3, 3) about axis "x", "y" or "z" by angles of any shape."""
     angle = np.asarray(angle_rad, float)
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     rows = {
@@ -19,7 +19,7 @@ def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
 
 
 def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
-    """Return the orientation R_world_from_cam of a camera that looks from one point at another.
+    """Return the orientation R_world_from_cam of a camera at one point that points at another.
 
     The camera's axes are OpenCV's (+X right, +Y down, +Z forward), and its image is upright. If the
     line of sight is vertical, +Y of the image is -Y of the world.
@@ -33,7 +33,7 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
 
 
 def from_rotation_vector(vector_rad: Floats) -> Rotations:
-    """Return the rotation (3, 3) about a vector (3,) by its length [rad] (Rodrigues)."""
+    """Return the rotation (3, 3) of a rotation vector (3,) [rad], by Rodrigues' formula."""
     x, y, z = np.asarray(vector_rad, float)
     angle = float(np.linalg.norm((x, y, z)))
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -42,7 +42,7 @@ def from_rotation_vector(vector_rad: Floats) -> Rotations:
 
 
 def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
-    """Return the rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    """Convert unit quaternions (..., 4) to rotation matrices (..., 3, 3)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion_wxyz, float), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -56,7 +56,7 @@ def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
 def rotate(
     quaternion: Floats | tuple[float, ...], vector: Floats | tuple[float, float, float]
 ) -> Vector3:
-    """Return a vector (3,) rotated by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
+    """Rotate a vector (3,) by a unit quaternion (w, u): v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     a = 2.0 * (y * vector[2] - z * vector[1])
     b = 2.0 * (z * vector[0] - x * vector[2])

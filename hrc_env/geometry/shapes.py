@@ -1,8 +1,7 @@
-"""Convex shapes as rows of tables (n, `WIDTH`), and where a line passes through them, exactly.
+"""Convex shapes as rows of tables (n, `WIDTH`), and their exact intersections with lines.
 
-A line starts at an eye and has a unit direction. The eye is given relative to the centre of the
-shape [m]. The passage of the line is the interval of distances from the eye at which it is inside
-of the shape.
+A line is given by its origin (the eye), relative to the centre of the shape [m], and by a unit
+direction. Its passage is the interval of distances from the eye over which it is inside the shape.
 """
 
 import math
@@ -14,42 +13,42 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Capsules, Floats, Vector3
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
-"""Kinds of shapes; a sphere is a capsule without length."""
+"""Kinds of shapes; a sphere is a capsule of length zero."""
 KIND, CENTRE, AXES, HALF_SIZE, REACH, WIDTH = 0, 1, 4, 13, 16, 17
-"""Columns of a table and their number: kind, centre [m], x, y and z axes, half edges (or radius and
-half length along z) [m] and the radius of the bounding sphere [m]."""
+"""Indices of the columns of a table, and their number: kind, centre [m], axes x, y and z, half edge
+lengths (or radius and half length along z) [m] and radius of the bounding sphere [m]."""
 PARALLEL = 1e-12
-"""Square of the sine below which a line counts as parallel to an axis."""
+"""Squared sine of the angle below which a line is considered parallel to an axis."""
 Vector: TypeAlias = Floats | Vector3
-"""(3,) an array or a `Vector3`."""
+"""A vector (3,), as an array or a `Vector3`."""
 
 
 class Passage(NamedTuple):
-    """The part of a line that is inside of a shape; empty if it ends before it begins."""
+    """The interval over which a line is inside a shape; it is empty if `leave` is below `enter`."""
 
     enter: float
-    """Distance from the eye at which the line enters the shape [m]; negative: behind the eye."""
+    """Distance from the eye at which the line enters the shape [m]; negative if behind the eye."""
     leave: float
-    """Distance from the eye at which the line leaves the shape [m]."""
+    """Distance from the eye at which the line leaves the shape [m]; negative if behind the eye."""
 
 
 NEVER = Passage(math.inf, -math.inf)
-"""The passage of a line that misses a shape."""
+"""The empty passage of a line that misses a shape."""
 ALWAYS = Passage(-math.inf, math.inf)
-"""The passage of a line that stays inside."""
+"""The infinite passage of a line that is entirely inside an unbounded shape."""
 
 
 class AxisLine(NamedTuple):
     """A line relative to the z axis of a cylinder or capsule."""
 
     rise: float
-    """Component of the line's direction along the axis."""
+    """Component of the line's direction along the z axis."""
     height: float
-    """Component of the eye along the axis, from the centre [m]."""
+    """Axial coordinate of the line's origin (the eye), relative to the shape's centre [m]."""
     ahead: float
-    """Component of the eye along the line's direction, from the centre [m]."""
+    """Coordinate of the eye along the line's direction, relative to the shape's centre [m]."""
     excess: float
-    """Squared distance of the eye from the centre less the squared radius [m^2]."""
+    """Squared distance of the eye from the shape's centre minus the squared radius [m^2]."""
 
 
 def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
@@ -57,10 +56,11 @@ def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
 
     Args:
         kind: `PLANE`, `BOX`, `CYLINDER` or `CAPSULE`.
-        centre: (3,) [m].
-        axes: (3, 3) world_from_shape; cylinders and capsules lie along z, planes face z.
-        half_size: (3,) half edges of a plane or box, infinite for one without end; else radius,
-            half length and 0 [m].
+        centre: (3,) position of the centre [m].
+        axes: (3, 3) rotation world_from_shape; z is the axis of cylinders and capsules, and the
+            normal of planes.
+        half_size: (3,) half edge lengths of a plane or box, infinite if it is unbounded; radius,
+            half length and 0 for other shapes [m].
     """
     row = np.empty(WIDTH)
     row[KIND], row[CENTRE:AXES], row[AXES:HALF_SIZE] = kind, centre, axes.T.ravel()
@@ -70,14 +70,14 @@ def shape(kind: int, centre: Floats, axes: Floats, half_size: Floats) -> Floats:
 
 
 def absent_shape() -> Floats:
-    """Return the row (`WIDTH`,) of a shape that no line can hit."""
+    """Return the row (`WIDTH`,) of a shape that no line intersects."""
     row = np.zeros(WIDTH)
     row[KIND], row[REACH] = CAPSULE, -np.inf
     return row
 
 
 def bounds(table: Floats) -> Floats:
-    """Return the lowest and the highest corner (2, 3) of a box around boxes and capsules [m]."""
+    """Return the lowest and highest corners (2, 3) of a box around boxes and capsules [m]."""
     axes, half = np.abs(table[:, AXES:HALF_SIZE].reshape(-1, 3, 3)), table[:, HALF_SIZE:REACH]
     boxes = np.einsum("gi,gij->gj", half, axes)
     rods = half[:, 1:2] * axes[:, 2] + half[:, :1]
@@ -88,7 +88,7 @@ def bounds(table: Floats) -> Floats:
 
 @kernel
 def set_rows(table: Floats, first: int, rows: Floats) -> None:
-    """Write shapes (n, `WIDTH`) into a table from row `first` on."""
+    """Copy shapes (n, `WIDTH`) to consecutive rows of a table, beginning with row `first`."""
     for k in range(len(rows)):
         for i in range(WIDTH):
             table[first + k, i] = rows[k, i]
@@ -96,13 +96,13 @@ def set_rows(table: Floats, first: int, rows: Floats) -> None:
 
 @kernel
 def set_capsules(table: Floats, first: int, ends: Capsules, radius: Floats) -> None:
-    """Write capsules into a table from row `first` on.
+    """Set consecutive rows of a table to capsules.
 
     Args:
-        table: (m, `WIDTH`) is changed.
-        first: the row of the first capsule.
+        table: (m, `WIDTH`) table, which is changed.
+        first: row of the first capsule.
         ends: (n, 2, 3) end points of the axes [m].
-        radius: (n,) [m].
+        radius: (n,) radii [m].
     """
     for k in range(len(ends)):
         row, squared = first + k, 0.0
@@ -120,13 +120,13 @@ def set_capsules(table: Floats, first: int, ends: Capsules, radius: Floats) -> N
 
 @kernel
 def passage(table: Floats, row: int, eye: Vector, direction: Vector) -> Passage:
-    """Return where a line passes through the shape of a row.
+    """Return the interval over which a line is inside a shape.
 
     Args:
-        table: (n, `WIDTH`) shapes.
-        row: the shape.
-        eye: (3,) where the line starts, from the shape's centre [m].
-        direction: (3,) unit vector.
+        table: (n, `WIDTH`) table of shapes.
+        row: row of the shape.
+        eye: (3,) origin of the line, relative to the shape's centre [m].
+        direction: (3,) unit direction of the line.
     """
     kind = table[row, KIND]
     if kind == BOX:
@@ -152,7 +152,7 @@ def on_axis(table: Floats, row: int, axis: int, vector: Vector) -> float:
 
 @kernel
 def line_from_axis(table: Floats, row: int, eye: Vector, direction: Vector) -> AxisLine:
-    """Return a line relative to the z axis and the radius of a cylinder or capsule."""
+    """Describe a line relative to the z axis and the radius of a cylinder or capsule."""
     radius = table[row, HALF_SIZE]
     ahead = eye[0] * direction[0] + eye[1] * direction[1] + eye[2] * direction[2]
     excess = eye[0] * eye[0] + eye[1] * eye[1] + eye[2] * eye[2] - radius * radius
@@ -162,7 +162,7 @@ def line_from_axis(table: Floats, row: int, eye: Vector, direction: Vector) -> A
 
 @kernel
 def cross_tube(line: AxisLine) -> Passage:
-    """Return the passage through a cylinder without ends."""
+    """Return the interval over which a line is inside a cylinder of infinite length."""
     rise, height = line.rise, line.height
     a, b, c = 1.0 - rise * rise, line.ahead - height * rise, line.excess - height * height
     if a < PARALLEL:
@@ -176,12 +176,12 @@ def cross_tube(line: AxisLine) -> Passage:
 
 @kernel
 def round_ends(tube: Passage, half: float, line: AxisLine) -> Passage:
-    """Return the passage through a capsule, given that through its endless cylinder.
+    """Return the interval over which a line is inside a capsule.
 
     Args:
-        tube: the passage through the cylinder.
+        tube: passage of the line through the infinite cylinder with the capsule's axis and radius.
         half: half the length of the capsule's axis [m].
-        line: the line relative to the axis.
+        line: the line relative to the capsule's axis.
     """
     enter, leave = tube.enter, tube.leave
     if enter > leave:
@@ -197,7 +197,7 @@ def round_ends(tube: Passage, half: float, line: AxisLine) -> Passage:
 
 @kernel
 def _cross_ball(end: float, line: AxisLine) -> Passage:
-    """Return the passage through the ball at `end` [m] on the axis."""
+    """Return the interval over which a line is inside the sphere at `end` [m] on the axis."""
     nearest = end * line.rise - line.ahead
     room = nearest * nearest - (line.excess - 2.0 * end * line.height + end * end)
     if room <= 0.0:
@@ -208,7 +208,7 @@ def _cross_ball(end: float, line: AxisLine) -> Passage:
 
 @kernel
 def _cross_box(table: Floats, row: int, eye: Vector, direction: Vector) -> Passage:
-    """Return the passage through a box."""
+    """Return the interval over which a line is inside a box."""
     enter, leave = -math.inf, math.inf
     for i in range(3):
         height, rise = on_axis(table, row, i, eye), on_axis(table, row, i, direction)
@@ -219,7 +219,7 @@ def _cross_box(table: Floats, row: int, eye: Vector, direction: Vector) -> Passa
 
 @kernel
 def _cross_plane(table: Floats, row: int, eye: Vector, direction: Vector) -> Passage:
-    """Return the passage through a rectangle, which only stops lines from its front (+z)."""
+    """Return the passage through a rectangle, which only intersects lines from its front (+z)."""
     height, rise = on_axis(table, row, 2, eye), on_axis(table, row, 2, direction)
     if height < 0.0 or rise >= 0.0:
         return NEVER
@@ -233,7 +233,7 @@ def _cross_plane(table: Floats, row: int, eye: Vector, direction: Vector) -> Pas
 
 @kernel
 def _cross_slab(height: float, rise: float, half: float) -> Passage:
-    """Return the passage between two parallel planes at -half and half [m]."""
+    """Return the interval over which a line is between parallel planes at -half and half [m]."""
     if rise == 0.0:
         return ALWAYS if abs(height) <= half else NEVER
     one, other = (-half - height) / rise, (half - height) / rise

@@ -1,7 +1,7 @@
-"""Occlusion: whether anything stands between an eye and points.
+"""Occlusion tests: whether a shape is between an eye and a point.
 
-Of a table of shapes, only those are tested exactly that are in the cone around the points and have
-bounding spheres that a line meets.
+A shape of a table is tested exactly only if it is in the viewing cone of the points and the line
+intersects its bounding sphere.
 """
 
 import math
@@ -17,22 +17,24 @@ from hrc_env.geometry import shapes
 from hrc_env.geometry.shapes import Passage, Vector
 
 NEAR_POINT_M = 0.08
-"""Last part of a line of sight that nothing blocks [m]: contact with a joint does not hide it."""
+"""Length of the last part of a line of sight in which occluders are ignored, so that an object in
+contact with a joint does not hide it [m]."""
 BLOCKING_CHORD = 1.4
-"""A line is blocked if it runs this many radii through a body's capsule, which lines within 0.7
-radii of the axis do."""
+"""Length inside a body's capsule above which a line is blocked, in units of the radius; lines
+within about 0.7 radii of the axis exceed it."""
 OWN_CAPSULE_M = 0.06
-"""Length by which the limit is longer in the capsule that contains the joint itself [m]."""
+"""Additional length that is allowed inside the capsule that contains the joint itself [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surroundings:
-    """All occluders between cameras and workers except the workers, in B environments."""
+    """The potential occluders of B environments, apart from the workers."""
 
     still: Floats
     """(G, `shapes.WIDTH`) shapes that never move."""
     moving: Floats
-    """(B, M, `shapes.WIDTH`) shapes that are carried; rows may be `shapes.absent_shape`."""
+    """(B, M, `shapes.WIDTH`) movable shapes, such as carried objects; rows may be
+    `shapes.absent_shape`."""
     capsules_world: Capsules
     """(B, K, 2, 3) capsules of the robot [m]."""
     capsule_radius_m: Floats
@@ -40,57 +42,57 @@ class Surroundings:
 
 
 class Occluders(NamedTuple):
-    """A table of shapes, the last of them workers' capsules, and a list of those in view."""
+    """A table of shapes that ends with the workers' capsules, and a list of the shapes in view."""
 
     table: Floats
-    """(G, `shapes.WIDTH`) the shapes."""
+    """(G, `shapes.WIDTH`) all shapes."""
     first_body: int
-    """First row of the workers' capsules."""
+    """Row of the first of the workers' capsules."""
     spheres: Floats
-    """(5, G) bounding spheres in view: centre less the eye (3) [m], squared length of the tangent
-    from the eye [m^2], radius [m]."""
+    """(5, G) bounding spheres of the shapes in view: centre relative to the eye (3) [m], squared
+    length of the tangent from the eye [m^2] and radius [m]."""
     rows: Ints
-    """(G,) row in the table of each shape in view."""
+    """(G,) row of each shape in view in the table."""
 
 
 class Ball(NamedTuple):
-    """A ball as seen from an eye [m]."""
+    """A sphere in coordinates relative to an eye."""
 
     x: float
-    """First coordinate of the middle, from the eye [m]."""
+    """First coordinate of the centre, relative to the eye [m]."""
     y: float
-    """Second coordinate of the middle, from the eye [m]."""
+    """Second coordinate of the centre, relative to the eye [m]."""
     z: float
-    """Third coordinate of the middle, from the eye [m]."""
+    """Third coordinate of the centre, relative to the eye [m]."""
     radius: float
-    """Radius [m]."""
+    """Radius of the sphere [m]."""
 
 
 class Line(NamedTuple):
     """A line from an eye to a point."""
 
     direction: Vector3
-    """Unit direction."""
+    """Unit direction from the eye to the point."""
     length: float
     """Distance of the point from the eye [m]."""
 
 
 def no_surroundings(batch: int) -> Surroundings:
-    """Return surroundings of `batch` environments in which nothing blocks a line of sight."""
+    """Return surroundings without occluders for `batch` environments."""
     still, moving = np.zeros((0, shapes.WIDTH)), np.zeros((batch, 0, shapes.WIDTH))
     return Surroundings(still, moving, np.zeros((batch, 0, 2, 3)), np.zeros(0))
 
 
 def find_hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
-    """Return which points are hidden from which eyes.
+    """Return a mask of the points that are hidden from each eye.
 
     Args:
-        surroundings: of B environments.
-        eyes_world: (C, 3) [m].
-        points_world: (B, J, 3) [m].
+        surroundings: occluders of B environments.
+        eyes_world: (C, 3) positions of the eyes [m].
+        points_world: (B, J, 3) positions of the points [m].
 
     Returns:
-        (B, C, J) true where something stands between eye and point.
+        (B, C, J) True where an occluder is between eye and point.
     """
     batch = len(surroundings.capsules_world)
     check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
@@ -118,7 +120,7 @@ def _find_hidden(
     points: Points3,
     hidden: Bools,
 ) -> None:
-    """Write which points (B, J, 3) are hidden from which eyes (C, 3); see `Surroundings`."""
+    """Compute the mask `hidden` (B, C, J) of `find_hidden`; see also `Surroundings`."""
     occluders = make_occluders(still, len(radius) + moving.shape[1], 0)
     table = occluders.table
     for b in range(len(points)):
@@ -132,12 +134,12 @@ def _find_hidden(
 
 @kernel(makes_arrays=True)
 def make_occluders(still: Floats, n_more: int, n_body: int) -> Occluders:
-    """Return a table that begins with `still` and has room for other shapes.
+    """Return a table that begins with `still` and has empty rows for further shapes.
 
     Args:
         still: (G, `shapes.WIDTH`) shapes that never move.
-        n_more: number of other shapes.
-        n_body: number of capsules of workers' bodies, which are last.
+        n_more: number of further shapes, apart from workers.
+        n_body: number of capsules of the workers' bodies, which are the last rows.
     """
     first_body = len(still) + n_more
     n = first_body + n_body
@@ -148,10 +150,11 @@ def make_occluders(still: Floats, n_more: int, n_body: int) -> Occluders:
 
 @kernel
 def select_occluders(eye: Floats, points: Points3, occluders: Occluders) -> int:
-    """List the shapes that may stand between an eye (3,) and any of the points (J, 3) [m].
+    """Find the shapes that may be between an eye (3,) and any of the points (J, 3) [m].
 
     Returns:
-        The number of shapes in view, the first entries of `spheres` and `rows` of `occluders`.
+        The number n of shapes in view; the first n entries of `occluders.spheres` and
+        `occluders.rows` describe them.
     """
     table, view = occluders.table, occluders.spheres
     ball = _bounding_ball(eye, points)
@@ -167,7 +170,7 @@ def select_occluders(eye: Floats, points: Points3, occluders: Occluders) -> int:
         if table[k, shapes.KIND] == shapes.PLANE:
             if not _is_plane_between(eye, points, table, k):
                 continue
-        elif sine < 1.0:  # the lines are in a cone; is the sphere beside or behind it?
+        elif sine < 1.0:  # skip spheres beside or behind the cone of the lines
             along = (x * ball.x + y * ball.y + z * ball.z) / far
             aside = math.sqrt(max(squared - along * along, 0.0))
             if aside * cosine - along * sine > reach or along > far + ball.radius + reach:
@@ -181,7 +184,7 @@ def select_occluders(eye: Floats, points: Points3, occluders: Occluders) -> int:
 
 @kernel
 def _bounding_ball(eye: Floats, points: Points3) -> Ball:
-    """Return a ball around points (J, 3), seen from an eye (3,) [m]."""
+    """Return a sphere around points (J, 3) [m], relative to an eye (3,) [m]."""
     x, y, z, n = 0.0, 0.0, 0.0, len(points)
     for j in range(n):
         x, y, z = x + points[j, 0], y + points[j, 1], z + points[j, 2]
@@ -195,7 +198,7 @@ def _bounding_ball(eye: Floats, points: Points3) -> Ball:
 
 @kernel
 def _is_plane_between(eye: Floats, points: Points3, table: Floats, row: int) -> bool:
-    """Return whether an eye (3,) is in front of a plane and any of the points (J, 3) is not."""
+    """Return whether an eye (3,) is in front of a plane and any of the points (J, 3) behind it."""
     level = shapes.on_axis(table, row, 2, table[row, shapes.CENTRE : shapes.AXES])
     if shapes.on_axis(table, row, 2, eye) < level:
         return False
@@ -207,14 +210,14 @@ def _is_plane_between(eye: Floats, points: Points3, table: Floats, row: int) -> 
 
 @kernel
 def is_hidden(eye: Floats, points: Points3, j: int, occluders: Occluders, n_view: int) -> bool:
-    """Return whether a shape stands between an eye and one of the points.
+    """Return whether a shape is between an eye and one of the points.
 
     Args:
-        eye: (3,) [m].
-        points: (J, 3) [m].
-        j: the point.
-        occluders: shapes, of which `select_occluders` has listed those in view.
-        n_view: number of shapes in view.
+        eye: (3,) position of the eye [m].
+        points: (J, 3) positions of the points [m].
+        j: index of the point.
+        occluders: the shapes, after a call of `select_occluders`.
+        n_view: number of shapes in view, as returned by `select_occluders`.
     """
     table, view = occluders.table, occluders.spheres
     line = line_to(eye, points, j)
@@ -233,7 +236,7 @@ def is_hidden(eye: Floats, points: Points3, j: int, occluders: Occluders, n_view
 
 @kernel
 def line_to(eye: Floats, points: Points3, j: int) -> Line:
-    """Return the line from an eye (3,) to one of the points (J, 3) [m]."""
+    """Return the line from an eye (3,) to point `j` of points (J, 3) [m]."""
     dx, dy, dz = points[j, 0] - eye[0], points[j, 1] - eye[1], points[j, 2] - eye[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     scale = 1.0 / max(length, 1e-9)
@@ -242,7 +245,7 @@ def line_to(eye: Floats, points: Points3, j: int) -> Line:
 
 @kernel
 def _hits_sphere(view: Floats, i: int, line: Line) -> bool:
-    """Return whether a line hits the i-th of the bounding spheres in view (5, G)."""
+    """Return whether a line intersects the i-th of the bounding spheres in view (5, G)."""
     d, reach = line.direction, view[4, i]
     along = view[0, i] * d.x + view[1, i] * d.y + view[2, i] * d.z
     return along * along >= view[3, i] and along >= -reach and along <= line.length + reach
@@ -250,7 +253,7 @@ def _hits_sphere(view: Floats, i: int, line: Line) -> bool:
 
 @kernel
 def _is_blocked(passage: Passage, length: float) -> bool:
-    """Return whether a line enters a shape, or leaves it from inside, before its length [m]."""
+    """Return whether a line of the given length [m] enters a shape, or leaves it from inside."""
     if passage.enter > passage.leave:
         return False
     first = passage.enter if passage.enter >= 0.0 else passage.leave
@@ -259,23 +262,23 @@ def _is_blocked(passage: Passage, length: float) -> bool:
 
 @kernel
 def is_behind_body(table: Floats, row: int, eye: Vector, direction: Vector, length: float) -> bool:
-    """Return whether the capsule of a body hides the point at the end of a line.
+    """Return whether a capsule of a body hides the point at the end of a line.
 
-    A joint lies inside the body, and so do the ends of the capsules that meet there: it is hidden
-    where the line runs through a capsule for much longer than from its axis to its surface.
+    Joints are inside the body, at the ends of the capsules that meet there. A joint is considered
+    hidden if the line's length inside a capsule is much greater than the capsule's radius.
 
     Args:
-        table: (n, `shapes.WIDTH`) shapes.
-        row: the capsule.
-        eye: (3,) where the line starts, from the capsule's centre [m].
-        direction: (3,) unit vector.
-        length: of the line [m].
+        table: (n, `shapes.WIDTH`) table of shapes.
+        row: row of the capsule.
+        eye: (3,) origin of the line, relative to the capsule's centre [m].
+        direction: (3,) unit direction of the line.
+        length: length of the line [m].
     """
     radius, half = table[row, shapes.HALF_SIZE], table[row, shapes.HALF_SIZE + 1]
     line = shapes.line_from_axis(table, row, eye, direction)
     tube = shapes.cross_tube(line)
     if min(tube.leave, length) - max(tube.enter, 0.0) <= BLOCKING_CHORD * radius:
-        return False  # and the way through the capsule is no longer
+        return False  # the length inside the capsule is not greater
     inside = shapes.round_ends(tube, half, line)
     is_within = inside.enter < length and inside.leave >= length
     chord = min(inside.leave, length) - max(inside.enter, 0.0)

@@ -1,11 +1,11 @@
-"""Triangulation: a point in space with its covariance, from its pixels in several cameras.
+"""Triangulation of points, with their covariances, from their pixels in several cameras.
 
-A linear solution is refined by Gauss-Newton on the reprojection error (Hartley and Zisserman,
-Multiple View Geometry, 2nd ed., chapter 12). With a gate, the search starts from the pair of
-cameras that agrees with the most others, so that a wrong detection in one view does no harm.
+A linear solution is refined by Gauss-Newton iterations on the reprojection error (Hartley and
+Zisserman, Multiple View Geometry, 2nd ed., chapter 12). If a gate is given, the search starts from
+the pair of cameras that agrees with the most others, so that wrong detections are rejected.
 
-Kernels take one point: projections P (C, 3, 4), pixels z (C, 2), their standard deviations
-sigma (C,) [px], and the views to use (C,).
+Kernels process one point: projection matrices P (C, 3, 4), pixels z (C, 2), their standard
+deviations sigma (C,) [px], and a mask (C,) of the views to use.
 """
 
 import math
@@ -19,47 +19,47 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 
 NEAREST_DEPTH_M = 0.05
-"""Least distance from a camera's plane of points with a usable pixel [m]."""
+"""Minimum depth of points with usable pixels [m]."""
 FURTHEST_PX = 1e5
-"""Greatest coordinate of a pixel that counts as a measurement [px]."""
+"""Greatest pixel coordinate that is accepted as a measurement [px]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Triangulation:
-    """Triangulated points with covariances, NaN where fewer than two views could be used."""
+    """Triangulated points with covariances, NaN where fewer than two views were usable."""
 
     points_world: Points3
-    """(B, W, J, 3) [m]."""
+    """(B, W, J, 3) positions of the points in the world frame [m]."""
     cov_world: Covariances3
-    """(B, W, J, 3, 3) inverse information of the views that were used [m^2]."""
+    """(B, W, J, 3, 3) covariances: the inverse of the information of the used views [m^2]."""
     used: Bools
-    """(B, C, W, J) the views that the point was made from."""
+    """(B, C, W, J) mask of the views from which each point was computed."""
 
 
 class Pixel(NamedTuple):
-    """The image of a point in a camera."""
+    """The projection of a point into a camera."""
 
     u: float
     """Column [px]."""
     v: float
     """Row [px]."""
     depth: float
-    """Distance of the point from the camera's plane [m]; not positive: behind the camera."""
+    """Depth of the point [m]; zero or negative if it is behind the camera."""
 
 
 def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.0) -> Triangulation:
-    """Return the weighted least-squares points of all views, or of those that agree.
+    """Triangulate points by weighted least squares from all views, or from those that agree.
 
     Args:
-        P: (C, 3, 4) projections.
+        P: (C, 3, 4) projection matrices.
         px: (B, C, W, J, 2) pixels; NaN where missing.
-        sigma_px: (B, C, W, J) standard deviations [px]; views count if theirs is finite and
-            positive.
-        gate_sigma: greatest reprojection error of views that agree, in standard deviations; 0: all
+        sigma_px: (B, C, W, J) standard deviations [px]; only views with finite and positive ones
+            are used.
+        gate_sigma: greatest reprojection error of agreeing views, in standard deviations; if 0, all
             views are used.
 
     Raises:
-        ConfigError: arrays of other shapes, or a negative gate.
+        ConfigError: an array has the wrong shape, or the gate is negative.
     """
     px, sigma_px = np.asarray(px, float), np.asarray(sigma_px, float)
     if not gate_sigma >= 0:
@@ -93,7 +93,7 @@ def _triangulate_all(
     cov: Covariances3,
     used: Bools,
 ) -> None:
-    """Write the points, covariances and views of `Triangulation`; see `triangulate`."""
+    """Compute the points, covariances and used views of `triangulate`."""
     n_batch, n_cameras, n_workers, n_joints, _ = px.shape
     z, sigma = np.empty((n_cameras, 2)), np.empty(n_cameras)
     ok, use = np.empty(n_cameras, np.bool_), np.empty(n_cameras, np.bool_)
@@ -116,7 +116,7 @@ def _triangulate_all(
 
 @kernel
 def inverse3(a: Floats, out: Floats) -> float:
-    """Write the inverse of a symmetric matrix (3, 3), and return the determinant."""
+    """Compute the inverse `out` of a symmetric matrix (3, 3), and return the determinant."""
     m00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]
     m01 = a[0, 2] * a[1, 2] - a[0, 1] * a[2, 2]
     m02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
@@ -134,7 +134,7 @@ def inverse3(a: Floats, out: Floats) -> float:
 
 @kernel
 def pixel_of(camera: Floats, x: float, y: float, z: float) -> Pixel:
-    """Return the pixel and the depth of a point [m] in a camera with a projection (3, 4)."""
+    """Return the pixel and the depth of a point [m] in a camera with a projection matrix (3, 4)."""
     depth = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
     u = (camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z + camera[0, 3]) / depth
     v = (camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z + camera[1, 3]) / depth
@@ -143,10 +143,10 @@ def pixel_of(camera: Floats, x: float, y: float, z: float) -> Pixel:
 
 @kernel(makes_arrays=True)
 def linear_point(P: Floats, z: Points2, use: Bools, out: Points3) -> bool:
-    """Write the point (3,) nearest to the planes of constant u and v of the used views [m].
+    """Compute the point (3,) nearest to the planes of constant u and v of the used views [m].
 
     Returns:
-        Whether there is such a point in front of all of these cameras.
+        Whether the point exists and is in front of all of these cameras.
     """
     information, inverse, right = np.zeros((3, 3)), np.empty((3, 3)), np.zeros(3)
     for c in range(len(P)):
@@ -176,7 +176,7 @@ def linear_point(P: Floats, z: Points2, use: Bools, out: Points3) -> bool:
 
 @kernel
 def add_outer(a: Floats, n0: float, n1: float, n2: float, weight: float) -> None:
-    """Add weight n n' to a symmetric matrix (3, 3)."""
+    """Add the weighted outer product weight n n' to a symmetric matrix (3, 3)."""
     a[0, 0] += weight * n0 * n0
     a[1, 1] += weight * n1 * n1
     a[2, 2] += weight * n2 * n2
@@ -196,19 +196,19 @@ def refine_point(
     cov: Covariances3,
     n_steps: int,
 ) -> bool:
-    """Improve a point by Gauss-Newton on the reprojection error.
+    """Refine a point by Gauss-Newton iterations on the reprojection error.
 
     Args:
-        P: (C, 3, 4) projections.
+        P: (C, 3, 4) projection matrices.
         z: (C, 2) pixels.
         sigma: (C,) standard deviations [px].
-        use: (C,) the views to use.
-        point: (3,) is changed [m].
-        cov: (3, 3) is filled with the inverse information [m^2].
+        use: (C,) mask of the views to use.
+        point: (3,) the point, which is changed [m].
+        cov: (3, 3) output: the covariance, that is the inverse information [m^2].
         n_steps: number of iterations.
 
     Returns:
-        Whether the point is finite, fixed by the views and in front of the cameras.
+        Whether the point is finite, determined by the views and in front of the cameras.
     """
     information, step, jacobian = np.empty((3, 3)), np.empty(3), np.empty((2, 3))
     for _ in range(n_steps):
@@ -220,7 +220,7 @@ def refine_point(
             u, v, depth = pixel_of(camera, point[0], point[1], point[2])
             if not depth > NEAREST_DEPTH_M:
                 return False
-            for i in range(3):  # derivatives of the pixel by the point [px/m]
+            for i in range(3):  # derivatives of the pixel with respect to the point [px/m]
                 jacobian[0, i] = (camera[0, i] - u * camera[2, i]) / depth
                 jacobian[1, i] = (camera[1, i] - v * camera[2, i]) / depth
             weight = 1.0 / sigma[c] ** 2
@@ -243,10 +243,10 @@ def refine_point(
 def point_from_views(
     P: Floats, z: Points2, sigma: Floats, use: Bools, point: Points3, cov: Covariances3
 ) -> int:
-    """Write the least-squares point (3,) [m] of the used views and its covariance (3, 3) [m^2].
+    """Compute the least-squares point (3,) [m] of the used views, and its covariance (3, 3) [m^2].
 
     Returns:
-        The number of views, 0 if there is no such point.
+        The number of used views, or 0 if there is no such point.
     """
     n_views = 0
     for c in range(len(P)):
@@ -261,11 +261,11 @@ def misfit(camera: Floats, u: float, v: float, sigma: float, point: Points3) -> 
     """Return the squared reprojection error of a point, in units of the variance.
 
     Args:
-        camera: (3, 4) projection.
+        camera: (3, 4) projection matrix.
         u: column of the measured pixel [px].
         v: row of the measured pixel [px].
         sigma: standard deviation of each coordinate [px].
-        point: (3,) [m].
+        point: (3,) the point [m].
     """
     expected_u, expected_v, depth = pixel_of(camera, point[0], point[1], point[2])
     if not depth > NEAREST_DEPTH_M:
@@ -287,17 +287,17 @@ def consensus_point(
     """Find the largest set of views that agree, starting from each pair of cameras.
 
     Args:
-        P: (C, 3, 4) projections.
+        P: (C, 3, 4) projection matrices.
         z: (C, 2) pixels.
         sigma: (C,) standard deviations [px].
-        ok: (C,) the views that are candidates.
-        gate_sigma: greatest reprojection error of views that agree, in standard deviations.
-        point: (3,) is filled [m].
-        cov: (3, 3) is filled [m^2].
-        use: (C,) is filled: the views that agree.
+        ok: (C,) mask of the candidate views.
+        gate_sigma: greatest reprojection error of agreeing views, in standard deviations.
+        point: (3,) output: the point of these views [m].
+        cov: (3, 3) output: the covariance of the point [m^2].
+        use: (C,) output: the mask of the agreeing views.
 
     Returns:
-        The number of views that agree, 0 if fewer than two.
+        The number of agreeing views, or 0 if there are fewer than two.
     """
     n_cameras, gate = len(P), gate_sigma * gate_sigma
     best, best_cost = np.zeros(3), np.inf
@@ -321,7 +321,7 @@ def consensus_point(
         return 0
     point[:] = best
     n_views = 0
-    for _ in range(2):  # the point of a pair is noisy: views are chosen again by the refined one
+    for _ in range(2):  # choose the views again by the refined point, which is less noisy
         n_views = 0
         for c in range(n_cameras):
             use[c] = ok[c] and misfit(P[c], z[c, 0], z[c, 1], sigma[c], point) < gate

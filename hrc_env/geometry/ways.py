@@ -1,9 +1,9 @@
-"""Paths on a floor among footprints: gaps on a grid, shortest paths to a place, ranges of rays.
+"""Planning on a floor with obstacles: distance fields, shortest paths and range measurements.
 
-Footprints (N, 5) are upright rectangles: middle x, y, half length, half width [m], yaw [rad]. Grids
-are square, with points `cell` metres apart from an origin (2,). Shortest paths are by Dijkstra
-(1959, doi:10.1007/BF01386390) with eight neighbours; rays by sphere tracing (Hart 1996,
-doi:10.1007/s003710050084).
+Footprints (N, 5) of obstacles are rectangles: centre x, y, half length, half width [m], yaw [rad].
+Grids are square, with a spacing of `cell` metres and a first point `origin` (2,). Shortest paths
+are found by Dijkstra's algorithm (1959, doi:10.1007/BF01386390) with eight neighbours, and ranges
+of rays by sphere tracing (Hart 1996, doi:10.1007/s003710050084).
 """
 
 import heapq
@@ -16,9 +16,9 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointAngles, Points2
 
 NEAREST_M = 0.02
-"""Gap at which a ray ends [m]."""
+"""Distance from an obstacle below which a ray ends [m]."""
 STEPS = 64
-"""Greatest number of steps along a ray."""
+"""Maximum number of steps along a ray."""
 
 
 class GridPoint(NamedTuple):
@@ -36,10 +36,10 @@ def gaps_m(xs: Floats, ys: Floats, footprints: Floats) -> Floats:
     Args:
         xs: (X,) first coordinates of the points [m].
         ys: (Y,) second coordinates of the points [m].
-        footprints: (N, 5) rectangles.
+        footprints: (N, 5) footprints of obstacles.
 
     Returns:
-        (X, Y) distances, negative inside of a footprint, infinite without any [m].
+        (X, Y) distances [m], negative inside a footprint, and infinite if there are no footprints.
     """
     gaps = np.full((len(xs), len(ys)), np.inf)
     for x, y, half_length, half_width, yaw in np.asarray(footprints, float).tolist():
@@ -53,12 +53,12 @@ def gaps_m(xs: Floats, ys: Floats, footprints: Floats) -> Floats:
 
 @kernel
 def value_at(x: float, y: float, field: Floats, origin: Floats, cell: float) -> float:
-    """Return the value of a field at a place, interpolated between its grid points.
+    """Return the value of a field at a position, interpolated between the grid points.
 
     Args:
-        x: first coordinate of the place [m].
-        y: second coordinate of the place [m].
-        field: (X, Y) values at the grid points; beyond them those of the edge count.
+        x: first coordinate of the position [m].
+        y: second coordinate of the position [m].
+        field: (X, Y) values at the grid points; outside the grid, those at its edge are used.
         origin: (2,) first point of the grid [m].
         cell: distance between the points of the grid [m].
     """
@@ -75,13 +75,13 @@ def ways_m(price: Floats, goal: tuple[int, int], cell: float) -> Floats:
     """Return the length of the shortest path from every grid point to a goal.
 
     Args:
-        price: (X, Y) factor on the length of a path at each point; infinite where it is blocked.
-        goal: indices of the goal.
+        price: (X, Y) cost per length of a path at each point; infinite at blocked points.
+        goal: grid indices of the goal.
         cell: distance between the points of the grid [m].
 
     Returns:
-        (X, Y) lengths [m]. A point that is blocked or cut off has the length of the nearest point
-        that is not, plus the distance to it.
+        (X, Y) lengths, weighted with the costs [m]. A blocked or unreachable point has the length
+        of the nearest reachable point plus the distance to that point.
     """
     ways = np.full(price.shape, np.inf)
     _find_shortest(np.ascontiguousarray(price, float), goal[0], goal[1], cell, ways)
@@ -90,10 +90,11 @@ def ways_m(price: Floats, goal: tuple[int, int], cell: float) -> Floats:
 
 @kernel(makes_arrays=True)
 def _find_shortest(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) -> None:
-    """Write the lengths (X, Y) of shortest paths; see `ways_m`.
+    """Compute the lengths `ways` (X, Y) of shortest paths; see `ways_m`.
 
-    Free points come first, from the goal on; then all others, from the free ones on, in the order
-    of their distance from these, so that the two sides of a wall do not mix.
+    The search first covers all reachable points, starting at the goal. It then extends from these
+    to all other points in the order of their distance, which assigns the two halves of a wall to
+    the two sides.
     """
     n_x, n_y = price.shape
     order = np.full((n_x, n_y), np.inf)
@@ -130,18 +131,18 @@ def ranges_m(
     cell: float,
     most_m: float,
 ) -> Floats:
-    """Return the lengths of horizontal rays from places to the nearest obstacle.
+    """Return the lengths of horizontal rays from given positions to the nearest obstacle.
 
     Args:
-        places: (B, 2 or more) x and y [m], then anything.
-        angles: (R,) directions of the rays from the x axis [rad].
+        places: (B, 2 or more) positions x and y [m]; further columns are ignored.
+        angles: (R,) directions of the rays, measured from the x axis [rad].
         gaps: (X, Y) distances of grid points from the nearest obstacle [m].
         origin: (2,) first point of the grid [m].
         cell: distance between the points of the grid [m].
-        most_m: greatest length of a ray [m].
+        most_m: maximum length of a ray [m].
 
     Returns:
-        (B, R) [m].
+        (B, R) lengths [m].
     """
     ranges = np.empty((len(places), len(angles)))
     _trace_rays(places, angles, gaps, origin, cell, most_m, ranges)
@@ -158,7 +159,7 @@ def _trace_rays(
     most_m: float,
     ranges: Floats,
 ) -> None:
-    """Write the lengths (B, R) of rays; each step is the gap, which holds no obstacle."""
+    """Compute the lengths `ranges` (B, R) of rays, in steps of the distance to the obstacles."""
     for b in range(len(places)):
         for k in range(len(angles)):
             way, c, s = 0.0, math.cos(angles[k]), math.sin(angles[k])
@@ -172,15 +173,15 @@ def _trace_rays(
 
 
 def find_overlaps(capsules_world: Capsules, radius_m: Floats, footprints: Floats) -> Bools:
-    """Return which robots overlap a footprint, seen from above.
+    """Return a mask of the robots that overlap a footprint, as seen from above.
 
     Args:
         capsules_world: (B, K, 2, 3) capsules of each robot [m].
-        radius_m: (K,) their radii [m].
-        footprints: (N, 5) rectangles.
+        radius_m: (K,) radii of the capsules [m].
+        footprints: (N, 5) footprints of obstacles.
 
     Returns:
-        (B,)
+        (B,) True for each robot that overlaps a footprint.
     """
     overlaps = np.zeros(len(capsules_world), bool)
     _find_overlaps(capsules_world, radius_m, np.asarray(footprints, float), overlaps)
@@ -189,9 +190,9 @@ def find_overlaps(capsules_world: Capsules, radius_m: Floats, footprints: Floats
 
 @kernel
 def _find_overlaps(capsules: Capsules, radius: Floats, footprints: Floats, overlaps: Bools) -> None:
-    """Set the robots (B,) that overlap a footprint.
+    """Compute the mask `overlaps` (B,) of the robots that overlap a footprint.
 
-    Two convex shapes that do not intersect are nearest to each other at a corner of one of them.
+    The closest points of two disjoint convex polygons include a corner of one of them.
     """
     for b in range(len(capsules)):
         for n in range(len(footprints)):
@@ -220,7 +221,7 @@ def _find_overlaps(capsules: Capsules, radius: Floats, footprints: Floats, overl
 
 @kernel
 def _from_rectangle(x: float, y: float, length: float, width: float) -> float:
-    """Return the distance of a point from a rectangle around the origin with these half sides."""
+    """Return the distance of a point from a rectangle with these half sides around the origin."""
     return math.hypot(max(abs(x) - length, 0.0), max(abs(y) - width, 0.0))
 
 
@@ -236,11 +237,11 @@ def _from_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float
 
 
 def nearest_point(x: float, y: float, origin: Floats, cell: float) -> GridPoint:
-    """Return the grid point nearest to a place.
+    """Return the grid point nearest to a position.
 
     Args:
-        x: first coordinate of the place [m].
-        y: second coordinate of the place [m].
+        x: first coordinate of the position [m].
+        y: second coordinate of the position [m].
         origin: (2,) first point of the grid [m].
         cell: distance between the points of the grid [m].
     """
@@ -249,9 +250,10 @@ def nearest_point(x: float, y: float, origin: Floats, cell: float) -> GridPoint:
 
 
 def select_apart(points: Points2, apart_m: float) -> Ints:
-    """Return indices of points (n, 2) that all are at least `apart_m` from each other [m].
+    """Select points (n, 2) with distances of at least `apart_m` [m], and return their indices.
 
-    The first point is chosen, then always the farthest from those that are chosen.
+    The selection begins with the first point and repeatedly adds the point farthest from all
+    selected ones.
     """
     chosen, away = [0], np.linalg.norm(points - points[0], axis=1)
     while (k := int(np.argmax(away))) and away[k] >= apart_m:

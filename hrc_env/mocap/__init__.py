@@ -1,1 +1,1 @@
-"""Bring your own motion: files of motion capture to clips that any worker plays."""
+"""Conversion of motion-capture files to clips that any worker can play."""

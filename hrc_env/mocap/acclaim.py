@@ -1,8 +1,8 @@
-"""Acclaim: a skeleton (ASF) and its motion (AMC), as in the CMU database.
+"""Reader of Acclaim files: a skeleton (ASF) and its motion (AMC), as in the CMU database.
 
-A bone's rotation in its parent's frame is C M C^-1: C turns the file's axes to the bone's own
-("axis"), and M is the rotation of its degrees of freedom, about fixed axes in the order in which
-they are written.
+A bone's rotation in its parent's frame is C M C^-1. C rotates the axes of the file to those of the
+bone ("axis"). M is the rotation by the bone's degrees of freedom, about fixed axes in the order of
+the file.
 """
 
 import re
@@ -24,12 +24,12 @@ FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 @dataclass(slots=True)
 class _Bone:
-    """One bone of a skeleton; the root has no length."""
+    """One bone of a skeleton; the root has a zero direction."""
 
     direction: Floats = field(default_factory=lambda: np.zeros(3))
-    """Direction (3,) from its start to its end."""
+    """Direction (3,) from the bone's start to its end."""
     length: float = 1.0
-    """Length [unit of the file]."""
+    """Length of the bone [unit of the file]."""
     axis: Rotations = field(default_factory=lambda: np.eye(3))
     """Rotation (3, 3) from the bone's axes to the file's."""
     freedoms: tuple[str, ...] = ()
@@ -37,7 +37,7 @@ class _Bone:
 
     @property
     def along(self) -> Floats:
-        """Vector (3,) from its start to its end [unit of the file]."""
+        """Vector (3,) from the bone's start to its end [unit of the file]."""
         norm = float(np.linalg.norm(self.direction))
         return self.direction / norm * self.length if norm else np.zeros(3)
 
@@ -51,20 +51,20 @@ class _Skeleton:
     parent: dict[str, str] = field(default_factory=dict)
     """Name of each bone's parent."""
     per_inch: float = 1.0
-    """Lengths of the file in an inch (CMU: 0.45)."""
+    """Length of one inch in the unit of the file (CMU: 0.45)."""
     is_in_radians: bool = False
-    """Whether angles are in radians, else in degrees."""
+    """Whether angles are in radians instead of degrees."""
 
 
 def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
-    """Return the motion in an AMC file, of the skeleton in its ASF file.
+    """Read the motion in an AMC file and the skeleton in the matching ASF file.
 
     Args:
-        path: the .amc file.
-        skeleton: the .asf file; None to look for it beside that.
+        path: path of the .amc file.
+        skeleton: path of the .asf file; None to search for it in the folder of the .amc file.
 
     Raises:
-        ConfigError: a file is missing, damaged or of another skeleton.
+        ConfigError: a file is missing, is damaged, or belongs to another skeleton.
     """
     if path.suffix.lower() == ".asf":
         raise ConfigError(f"{path.name} is a skeleton without motion; give its .amc file.")
@@ -80,7 +80,7 @@ def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
 
 
 def _find_skeleton(path: Path) -> Path:
-    """Return the ASF file beside an AMC file: of its name, its subject, or the only one."""
+    """Return the ASF file beside an AMC file: of the same name or subject, or the only one."""
     beside = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf")
     for stem in (path.stem, path.stem.split("_")[0]):
         for candidate in beside:
@@ -96,13 +96,13 @@ def _find_skeleton(path: Path) -> Path:
 
 
 def _read_subject(path: Path) -> str:
-    """Return the subject's number in the CMU database, if any: 2 for 02.asf, 02_01.amc."""
+    """Return the subject's number in the CMU database, or "": "2" for 02.asf and 02_01.amc."""
     number = re.match(r"0*(\d+)(?=_|$)", path.stem)
     return number[1] if number else ""
 
 
 def _read_asf(path: Path) -> _Skeleton:
-    """Return the bones of an ASF file, their tree and their units."""
+    """Read the bones, hierarchy and units in an ASF file."""
     rows, skeleton, done = Rows(path), _Skeleton(), list[str]()
     bone, name = _Bone(), ""
     for words in rows.remaining():
@@ -132,13 +132,13 @@ def _read_asf(path: Path) -> _Skeleton:
 
 
 def _read_bone(words: list[str], bone: _Bone, is_in_radians: bool, rows: Rows) -> None:
-    """Read one line of a bone; limits and masses are skipped.
+    """Read one line on a bone; limits and masses are ignored.
 
     Args:
         words: words of the line.
-        bone: the bone, which is changed.
+        bone: bone of the line, which is changed.
         is_in_radians: whether angles are in radians.
-        rows: the file, for errors.
+        rows: lines of the file, for error messages.
     """
     if words[0] == "direction":
         bone.direction = np.array(rows.to_numbers(words[1:4]))
@@ -154,12 +154,12 @@ def _read_bone(words: list[str], bone: _Bone, is_in_radians: bool, rows: Rows) -
 
 
 def _check_skeleton(skeleton: _Skeleton, done: list[str], source: str) -> None:
-    """Refuse a skeleton that is incomplete, or has degrees of freedom that no file of people has.
+    """Raise `ConfigError` if a skeleton is incomplete or has unknown degrees of freedom.
 
     Args:
-        skeleton: the skeleton.
+        skeleton: content of the file.
         done: names of the sections that were read.
-        source: name of the file, for errors.
+        source: name of the file, for error messages.
     """
     missing = [part for part in ("units", "root", "bonedata", "hierarchy") if part not in done]
     if missing or not skeleton.parent:
@@ -179,16 +179,16 @@ def _check_skeleton(skeleton: _Skeleton, done: list[str], source: str) -> None:
 
 
 class _Motion(NamedTuple):
-    """The content of an AMC file."""
+    """Content of an AMC file."""
 
     values: dict[str, Floats]
-    """Values (T, freedoms) of every bone that moves."""
+    """Values (T, freedoms) of every moving bone, by name."""
     notes: tuple[str, ...]
     """A sentence for each deviation from the format."""
 
 
 def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
-    """Return the motion in an AMC file."""
+    """Read the motion in an AMC file."""
     rows, frames = Rows(path), list[dict[str, list[float]]]()
     for words in rows.remaining():
         if words[0][0] in "#:":
@@ -224,7 +224,7 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
 
 
 def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
-    """Return every bone as a node at its start, and the tips of the chains, in inches."""
+    """Return the bones as nodes at their starts, and the tips of the chains, in inches."""
     (names, parent, along), values = _list_nodes(skeleton), motion.values
     offset = np.repeat(along[None] / skeleton.per_inch, len(values[ROOT]), axis=0)
     for column, freedom in enumerate(skeleton.bones[ROOT].freedoms):
@@ -253,7 +253,7 @@ def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
 
 
 class _Nodes(NamedTuple):
-    """Bones and tips of a skeleton, parents first."""
+    """Bones and chain tips of a skeleton, parents first."""
 
     names: list[str]
     """Name of each node."""
@@ -264,9 +264,9 @@ class _Nodes(NamedTuple):
 
 
 def _list_nodes(skeleton: _Skeleton) -> _Nodes:
-    """Return bones and tips, parents first."""
+    """Return the bones and chain tips of a skeleton, parents first."""
     names, parent, along, tips = [ROOT], [-1], [np.zeros(3)], []
-    for node, name in enumerate(names):  # grows while it is read
+    for node, name in enumerate(names):  # the list grows during the iteration
         children = [child for child, above in skeleton.parent.items() if above == name]
         names += children
         parent += [node] * len(children)
@@ -280,11 +280,11 @@ def _list_nodes(skeleton: _Skeleton) -> _Nodes:
 
 
 def _compose_turns(freedoms: tuple[str, ...], values: Floats, is_in_radians: bool) -> Rotations:
-    """Return rotations (T, 3, 3) about fixed axes, the first one applied first.
+    """Compose rotations (T, 3, 3) about fixed axes, in the order of application.
 
     Args:
-        freedoms: degrees of freedom; those of translation have no effect.
-        values: their values (T, freedoms).
+        freedoms: degrees of freedom; translations are ignored.
+        values: values (T, freedoms) of the degrees of freedom.
         is_in_radians: whether angles are in radians.
     """
     turned = np.tile(np.eye(3), (len(values), 1, 1))

@@ -1,4 +1,4 @@
-"""BVH: a tree of joints, each with its own order of channels, then a row of numbers a frame."""
+"""Reader of BVH files: a tree of joints with channels, and a row of numbers per frame."""
 
 import re
 from collections.abc import Iterator
@@ -16,44 +16,44 @@ from hrc_env.mocap.rows import Rows, separate_numbers, to_number
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 COMMENTS = "#|//"
-"""Signs that begin a comment."""
+"""Regular expression of the signs that begin a comment."""
 LEAST_SHARE = 0.5
-"""Least share of the announced frames that a file must contain; judgement."""
+"""Least share of the announced number of frames that a file must contain; judgement."""
 LIMB = 4
-"""Least number of nodes in a row, a tip included, of a leg or of a trunk with an arm."""
+"""Least number of nodes, including the tip, in the chain of a leg or of a trunk with an arm."""
 NEAR_ZERO = 0.5
-"""Share of its OFFSET up to which the positions of a bone are meant to be added to it."""
+"""Size of a bone's positions relative to its OFFSET below which they are added to the OFFSET."""
 
 
 @dataclass(slots=True)
 class _Node:
-    """One node of the hierarchy while it is being read."""
+    """One node of the hierarchy."""
 
     name: str
     """Name of the node."""
     parent: int
-    """Index of its parent; -1 for none."""
+    """Index of the parent; -1 for none."""
     offset: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    """Its OFFSET (3,) [unit of the file]."""
+    """OFFSET (3,) of the node [unit of the file]."""
     channels: list[str] = field(default_factory=list)
-    """Names of its channels, in the order of the file."""
+    """Names of the node's channels, in the order of the file."""
 
 
 class _NodePoses(NamedTuple):
-    """Nodes in their parents' frames over time."""
+    """Poses of nodes in their parents' frames over time."""
 
     offset: Points3
     """Positions (T, N, 3) [unit of the file]."""
     rotation: Rotations
     """Rotations (T, N, 3, 3)."""
     stated: dict[int, Points3]
-    """OFFSET (3,) of the nodes that carry the whole body and have positions, 0 in other axes."""
+    """OFFSET (3,) of nodes that carry the whole body, in axes with position channels; else 0."""
     notes: tuple[str, ...]
     """A sentence for each deviation from the format."""
 
 
 def read_bvh(path: Path) -> Moving:
-    """Return the skeleton of a BVH file over time; `ConfigError` if it is none, or cut off."""
+    """Read a BVH file; raise `ConfigError` if it has another format or is truncated."""
     rows = Rows(path, COMMENTS)
     nodes = _read_tree(rows)
     announced = _read_after("frames?", rows, "Frames:")
@@ -76,12 +76,12 @@ def read_bvh(path: Path) -> Moving:
 
 
 def _read_after(pattern: str, rows: Rows, title: str) -> float:
-    """Return the number after a title on the next line, with or without colon and blanks.
+    """Return the number after a title on the next line; colon and blanks are optional.
 
     Args:
         pattern: regular expression of the title.
-        rows: the file.
-        title: the title, for errors.
+        rows: lines of the file.
+        title: title, for error messages.
     """
     text = " ".join(rows.next(title))
     match = re.fullmatch(rf"{pattern}\s*:?\s*(\S+)", text, re.IGNORECASE)
@@ -91,7 +91,7 @@ def _read_after(pattern: str, rows: Rows, title: str) -> float:
 
 
 def _read_tree(rows: Rows) -> list[_Node]:
-    """Return the nodes before MOTION."""
+    """Read the nodes of the hierarchy, up to the word MOTION."""
     if rows.next("HIERARCHY")[0].upper() != "HIERARCHY":
         raise rows.make_error("a BVH file begins with the word HIERARCHY")
     nodes, open_nodes = list[_Node](), list[int]()
@@ -120,7 +120,7 @@ def _read_tree(rows: Rows) -> list[_Node]:
 
 
 def _split_statements(rows: Rows) -> Iterator[list[str]]:
-    """Yield the words of each line, or the parts of a line with braces."""
+    """Yield the words of each statement: a line, or a part of a line with braces."""
     while True:
         for part in re.split(r"([{}])", " ".join(rows.next("the skeleton"))):
             if words := part.split():
@@ -128,7 +128,7 @@ def _split_statements(rows: Rows) -> Iterator[list[str]]:
 
 
 def _read_channels(words: list[str], rows: Rows) -> list[str]:
-    """Return the names of a joint's channels in lower case."""
+    """Return the names of a joint's channels in lowercase."""
     named = [word.lower() for word in words[2:]]
     if words[1:2] != [str(len(named))] or any(name not in CHANNELS for name in named):
         raise rows.make_error(
@@ -138,7 +138,7 @@ def _read_channels(words: list[str], rows: Rows) -> list[str]:
 
 
 class _Frames(NamedTuple):
-    """The numbers in the frames of a file."""
+    """Numbers in the frames of a file."""
 
     values: Floats
     """Numbers (T, width)."""
@@ -147,12 +147,12 @@ class _Frames(NamedTuple):
 
 
 def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
-    """Return the numbers of the frames; an incomplete last line is left out.
+    """Read the numbers of the frames; an incomplete last line is ignored.
 
     Args:
-        rows: the file.
+        rows: lines of the file.
         width: number of channels.
-        announced: announced number of frames.
+        announced: number of frames that the file announces.
     """
     first, lines = rows.at, [separate_numbers(words, width) for words in rows.remaining()]
     if lines and len(lines[-1]) < width:
@@ -177,7 +177,7 @@ def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
 
 
 def _to_numbers(lines: list[list[str]], source: str) -> Floats:
-    """Return the numbers in lines of words, NaN for missing ones."""
+    """Convert lines of words to numbers, with NaN for missing values."""
     try:
         values = np.array(lines, dtype=float)
     except ValueError:
@@ -189,13 +189,14 @@ def _to_numbers(lines: list[list[str]], source: str) -> Floats:
 
 
 def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses:
-    """Return every node in its parent's frame; its position channels replace its OFFSET.
+    """Return the nodes' poses in their parents' frames; position channels replace the OFFSET.
 
-    Some programs write displacements from the OFFSET of a bone, which are recognized by their small
-    size and added. The position of the whole body has no such mark (see `Moving.shift`).
+    Some programs write the positions of bones relative to their OFFSET. Such positions are
+    recognized by their small size and added to the OFFSET. This criterion does not apply to the
+    position of the whole body (see `Moving.shift`).
 
     Args:
-        nodes: the hierarchy.
+        nodes: nodes of the hierarchy.
         parent: parent (N,) of each node.
         values: numbers (T, width) of the frames.
     """
@@ -224,7 +225,7 @@ def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses
 
 
 def _find_carriers(parent: Ints) -> set[int]:
-    """Return the nodes that carry the whole body: from the root to where legs and trunk part."""
+    """Return the nodes that carry the whole body: from the root to the branching of the legs."""
     depth, carriers = np.ones(len(parent), int), set[int]()
     for node in range(len(parent) - 1, 0, -1):
         if parent[node] >= 0:

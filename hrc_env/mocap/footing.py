@@ -1,4 +1,4 @@
-"""The floor of a recording, found by the feet of the person, and whether they are on it."""
+"""Estimation of a recording's floor from the feet, and checks that the person is on it."""
 
 from typing import NamedTuple
 
@@ -13,68 +13,69 @@ from hrc_env.mocap.record import Repaired
 ANKLE_M = 0.06
 """Height of the ankle above the tip of a standing foot [m], from the baked bodies."""
 RESTS_M_S = 0.15
-"""Rate of the height of the lower foot below which it rests [m/s].
+"""Vertical speed of the lower foot below which it is at rest [m/s].
 
-Recordings with sliding feet are not refused.
+Horizontal speed is ignored, so that recordings with sliding feet are accepted.
 """
 SMOOTH_S = 0.05
-"""Time over which heights are smoothed [s]."""
+"""Standard deviation of the smoothing of heights [s]."""
 LEAST_S = 0.1
 """Duration of the shortest rest of a foot [s]."""
 FLOOR_SHARE = 20.0
-"""Percentile of the heights of resting feet at the floor: people step up more than down."""
+"""Percentile of the heights of feet at rest that is the floor: people step up more than down."""
 LEAST_TILT_RAD = 0.015
-"""Least tilt of a floor that is levelled [rad]."""
+"""Least tilt of the floor that is corrected [rad]."""
 MOST_TILT_RAD = 0.07
-"""Greatest tilt of a floor that is levelled [rad]."""
+"""Greatest tilt of the floor that is corrected [rad]."""
 EVEN_M = 0.015
-"""Greatest standard deviation of resting feet from the plane of a floor that is levelled [m]."""
+"""Greatest standard deviation of feet at rest from a tilted plane that is corrected [m]."""
 APART_M = 1.0
-"""Least extent of resting feet along the slope of a floor that is levelled [m]."""
+"""Least extent of feet at rest in a direction in which tilt is corrected [m]."""
 LEVEL_M = 0.08
-"""Distance of resting feet from the floor beyond which they stand on an object [m]."""
+"""Height of feet at rest relative to the floor beyond which they stand on an object [m]."""
 LEVEL_S = 0.3
-"""Greatest time that feet may rest on objects in all [s]."""
+"""Greatest total time for which feet may rest on objects [s]."""
 AIR_M = 0.10
-"""Height of both feet above which a person is in the air, without a hand on the floor [m]."""
+"""Height of both feet above which a person without a hand on the floor is in the air [m]."""
 AIR_S = 0.7
 """Duration of the longest jump [s]."""
 HAND_M = 0.1
-"""Height of the wrist of a hand on the floor [m]."""
+"""Height of the wrist when the hand is on the floor [m]."""
 RUN_M_S = 2.5
-"""Speed of a person above which the feet hardly rest [m/s]."""
+"""Speed of a person above which feet need not be at rest [m/s]."""
 LEAST_SHARE = 0.1
-"""Least share of the time in which one foot or the other rests."""
+"""Least share of the time in which at least one foot is at rest."""
 FLOOR_M = (-0.03, 0.09)
-"""Heights of the tips of standing feet between which the floor of the file is accepted [m]."""
+"""Range of the height of standing feet's tips for which the file's floor is accepted [m]."""
 SOLE_M = 0.03
-"""Height of the tips of feet on a floor that was found [m]; 0.01 to 0.04 for the baked bodies."""
+"""Height of feet's tips above an estimated floor [m]; 0.01 to 0.04 for the baked bodies."""
 ACCEPT = "To play it all the same, as on one floor: --allow-off-floor (allow_off_floor=True)."
 
 
 class Support(NamedTuple):
-    """The lower foot of a person over time."""
+    """Motion of a person's lower foot over time."""
 
     height: Floats
-    """Height (T,) of its tip if it is flat [m]."""
+    """Height (T,) of the foot's tip, or that of the ankle minus `ANKLE_M` if it is lower [m]."""
     rests: Bools
-    """Whether it rests (T,)."""
+    """Mask (T,) of frames in which the foot is at rest."""
 
 
 def put_on_floor(
     joints: Points3, fps: float, source: str, at_zero: bool, is_allowed: bool
 ) -> Repaired:
-    """Return joints on a level floor at 0, moved only if the file's floor is elsewhere.
+    """Return joints on a level floor at 0; they are moved only if the file's floor is elsewhere.
 
     Args:
         joints: joints (T, 15, 3), upright [m].
         fps: frame rate [Hz].
-        source: name of the file, for errors.
-        at_zero: whether the file's floor is at 0 by convention, with a skeleton from another file.
+        source: name of the file, for error messages.
+        at_zero: whether the file's floor is at 0 by convention, so that another floor indicates the
+            skeleton of another person.
         is_allowed: whether faults are accepted.
 
     Raises:
-        ConfigError: the feet are not on one floor, or not on the file's, and faults are not
+        ConfigError: the feet are not on one floor or not on the file's floor, and faults are not
             accepted.
     """
     joints, notes = level_floor(joints, fps)
@@ -107,7 +108,7 @@ def _is_hanging(joints: Points3) -> bool:
 
 
 def find_support(joints: Points3, fps: float) -> Support:
-    """Return height and rest of the lower foot."""
+    """Return the height of the lower foot, and whether it is at rest, for each frame."""
     ankles, tips = (
         [joints[:, JOINT[f"{side}_{part}"], 2] for side in ("left", "right")]
         for part in ("ankle", "foot")
@@ -120,7 +121,7 @@ def find_support(joints: Points3, fps: float) -> Support:
 
 
 def measure_floor_height(joints: Points3, fps: float) -> float:
-    """Return the height of the tips of resting feet, or of the lowest if none rests [m]."""
+    """Return the height of the tips of feet at rest, or of the lowest ones if none rests [m]."""
     height, rests = find_support(joints, fps)
     return float(
         np.percentile(height[rests], FLOOR_SHARE) if rests.any() else np.percentile(height, 5.0)
@@ -128,7 +129,7 @@ def measure_floor_height(joints: Points3, fps: float) -> float:
 
 
 def level_floor(joints: Points3, fps: float) -> Repaired:
-    """Return joints turned so that a slightly tilted floor is level."""
+    """Return joints rotated so that a slightly tilted floor becomes level."""
     height, rests = find_support(joints, fps)
     points = np.column_stack([joints[rests, JOINT["left_hip"], :2], height[rests]])
     if len(points) < 3:
@@ -145,7 +146,7 @@ def level_floor(joints: Points3, fps: float) -> Repaired:
 
 
 def _make_levelling(slope: Floats) -> Rotations:
-    """Return the smallest rotation (3, 3) of a plane z = slope . (x, y) to z = 0."""
+    """Return the smallest rotation (3, 3) that takes the plane z = slope . (x, y) to z = 0."""
     up = np.array([-slope[0], -slope[1], 1.0]) / np.sqrt(1.0 + slope @ slope)
     x, y, z = up
     cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
@@ -181,7 +182,7 @@ def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
 
 
 def _is_running(joints: Points3, height: Floats, fps: float) -> bool:
-    """Return whether the person runs: fast, with a foot near the floor every `AIR_S` at least."""
+    """Return whether the person runs: fast, with a foot near the floor at least every `AIR_S`."""
     hip = joints[:, JOINT["left_hip"], :2]
     speed_m_s = np.median(np.linalg.norm(np.diff(hip, axis=0), axis=-1)) * fps
     aloft = max((end - first for first, end in find_runs(height > LEVEL_M)), default=0)

@@ -1,4 +1,4 @@
-"""A first control vector from joints, by geometry alone; `retarget.fit_controls` improves it."""
+"""Initial control vectors from joints by geometry; `retarget.fit_controls` refines them."""
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
 
 HEADING_S = 0.25
-"""Time over which the pelvis's direction is smoothed for the heading [s]."""
+"""Standard deviation of the smoothing of the pelvis's direction for the heading [s]."""
 PELVIS_SHARE = 0.45
-"""Share of the pelvis in the trunk's pitch, as in `posture.lean`."""
+"""Share of the pelvis in the pitch of the trunk, as in `posture.lean`."""
 VERTICAL_SHARE = 0.2
-"""Share of a foot's length up to which a nearly vertical foot heads where the pelvis does."""
+"""Horizontal extent of a foot, relative to its length, below which it heads like the pelvis."""
 NOSE_PITCH_RAD = 0.6
-"""Pitch of the nose from mid-shoulder, forward of the trunk's axis, in a level head [rad]."""
+"""Angle between the nose, seen from mid-shoulder, and the trunk's axis for a level head [rad]."""
 
 
 def guess_controls(joints: Points3, fps: float, marks: Marks) -> Floats:
-    """Return control vectors (T, N_CONTROLS) for given joints.
+    """Estimate control vectors (T, N_CONTROLS) from joints.
 
     Args:
-        joints: joints (T, 15, 3) that the worker should have [m].
+        joints: desired joints (T, 15, 3) of the worker [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
     """
@@ -54,7 +54,7 @@ def guess_controls(joints: Points3, fps: float, marks: Marks) -> Floats:
 
 
 def _guess_arm(q: Floats, side: int, name: str, joints: Points3, chest_yaw: Floats) -> None:
-    """Write the grip from the shoulder, and the elbow's swivel, in the chest's level frame.
+    """Estimate the grip relative to the shoulder, and the swivel of the elbow.
 
     Args:
         q: control vectors (T, N_CONTROLS), which are changed.
@@ -76,11 +76,11 @@ def _guess_arm(q: Floats, side: int, name: str, joints: Points3, chest_yaw: Floa
 
 
 def _find_swivel(reach: Points3, elbow: Points3, hanging: Floats, outward: Floats) -> Floats:
-    """Return angles s (T,) for which cos(s) hanging + sin(s) outward points to the elbow.
+    """Return the angles s (T,) at which cos(s) hanging + sin(s) outward points to the elbow.
 
     Args:
-        reach: grip (T, 3) from the shoulder.
-        elbow: elbow (T, 3) from the shoulder.
+        reach: grip (T, 3) relative to the shoulder.
+        elbow: elbow (T, 3) relative to the shoulder.
         hanging: direction (3,) of a hanging elbow.
         outward: direction (3,) of an elbow that points outwards.
     """
@@ -95,7 +95,7 @@ def _find_swivel(reach: Points3, elbow: Points3, hanging: Floats, outward: Float
 
 
 def _guess_foot(q: Floats, side: int, name: str, joints: Points3, marks: Marks) -> None:
-    """Write ankle, heading and pitch of a foot; the pitch passes the vertical for a kneeling foot.
+    """Estimate ankle, heading and pitch of a foot; a kneeling foot may pitch beyond the vertical.
 
     Args:
         q: control vectors (T, N_CONTROLS), which are changed.
@@ -118,12 +118,12 @@ def _guess_foot(q: Floats, side: int, name: str, joints: Points3, marks: Marks) 
 
 
 def _find_yaw(leftward: Points3) -> Floats:
-    """Return the direction that a person faces with the left side there (T,) [rad]."""
+    """Return the heading (T,) of a person, given vectors to the person's left [rad]."""
     return np.arctan2(-leftward[:, 0], leftward[:, 1])
 
 
 def _turn_about_z(points: Points3, yaw: Floats) -> Points3:
-    """Return points (T, 3) turned about +z by angles (T,)."""
+    """Rotate points (T, 3) about +z by angles (T,) [rad]."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y, z = points.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)

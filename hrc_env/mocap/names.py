@@ -1,11 +1,11 @@
-"""The meaning of joint names: words of many programs for a side and a part of the body."""
+"""Interpretation of joint names: words of many programs for sides and parts of the body."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.mapping import read_toml
 from hrc_env.core.skeleton import JOINTS
 
@@ -34,21 +34,21 @@ SIDED: dict[str, tuple[str, ...]] = {
         "foot",
     ),
 }
-"""Names of a joint, best first, without prefixes and sides.
+"""Names of each joint without prefixes and sides, the best name first.
 
-A side may precede, follow or interrupt them; "x end" is the tip (End Site) of joint x.
+A side may be before, after or inside a name; "x end" is the tip (End Site) of joint x.
 """
 HEAD: tuple[str, ...] = ("head", "skull", "face")
-"""Names of the node that turns with the face."""
+"""Names of the node that rotates with the face."""
 NAMED = (*JOINTS, "head")
-"""Names for which a node can be given explicitly."""
+"""Names of joints for which a node can be specified explicitly."""
 SIDES = {
     **dict.fromkeys(("left", "l", "lft", "lf"), "left"),
     **dict.fromkeys(("right", "r", "rgt", "rt"), "right"),
 }
-"""Words for a side."""
+"""Side by its word or abbreviation."""
 TAILS = ("joint", "jnt", "jt", "bone", "bn", "bend", "skin", "bind")
-"""Words behind a name without a meaning."""
+"""Meaningless words at the end of a name."""
 OWN = frozenset(
     (
         "fore",
@@ -101,38 +101,38 @@ OWN = frozenset(
         "in",
     )
 )
-"""Words that belong to a name: without one of them it means another part."""
+"""Words that must not be omitted from a name, because they change its meaning."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 CUT = 0.05
-"""Cost of each word that is left out before a name; each better name of a joint costs 1."""
+"""Cost of each word that is omitted before a name; a joint's name at index k costs k."""
 TAIL = 0.2
-"""Cost of each word that is left out behind a name."""
+"""Cost of each word that is omitted after a name."""
 TURNED = 0.1
-"""Cost of two words in reverse order."""
+"""Cost of two words in reversed order."""
 
 
 class _Joined(NamedTuple):
-    """Words joined to one."""
+    """Several words joined to one word."""
 
     word: str
-    """The word."""
+    """Joined word."""
     cost: float
-    """Cost of the words that were left out or reversed."""
+    """Cost of words that were omitted or reversed."""
 
 
 class Reading(NamedTuple):
-    """One way to read a node's name."""
+    """One interpretation of a node's name."""
 
     side: str
-    """"left", "right" or ""."""
+    """Side of the body: "left", "right" or ""."""
     word: str
-    """Part of the body, in lower case without blanks; with " end" for a tip."""
+    """Part of the body, in lowercase without blanks; with " end" for a tip."""
     cost: float
-    """Cost of the parts that were left out."""
+    """Cost of words that were omitted or reversed."""
 
 
 def read_name(name: str) -> list[Reading]:
-    """Return the ways to read a name such as "mixamorig:LeftUpLeg" or "Bip01 L UpperArm"."""
+    """Return interpretations of a name such as "mixamorig:LeftUpLeg" or "Bip01 L UpperArm"."""
     end, words = " end" if name.endswith(" end") else "", _split_words(name)
     readings, cost = [*_split_readings(words, 0.0)], 0.0
     while len(words) > 1:
@@ -152,12 +152,12 @@ def has_side(name: str) -> bool:
 
 
 def _split_words(name: str) -> list[str]:
-    """Return the words of a name in lower case, without a namespace before a colon."""
+    """Return the words of a name in lowercase, without a namespace before a colon."""
     return [word.lower() for word in WORD.findall(name.rsplit(":", 1)[-1].removesuffix(" end"))]
 
 
 def _split_readings(words: list[str], cost: float) -> Iterator[Reading]:
-    """Yield readings of words: with a side anywhere or none, without some of the first words."""
+    """Yield interpretations of words, with a side at any position, and without leading words."""
     for k in [k for k, word in enumerate(words) if word in SIDES]:
         rest = words[:k] + words[k + 1 :]
         yield from (Reading(SIDES[words[k]], word, cost + more) for word, more in _join_words(rest))
@@ -171,7 +171,7 @@ def _split_readings(words: list[str], cost: float) -> Iterator[Reading]:
 
 
 def _join_words(words: list[str]) -> Iterator[_Joined]:
-    """Yield words joined to one, without more and more of the first ones, and the cost."""
+    """Yield the words joined to one word, each time with one leading word less."""
     for k in range(len(words)):
         if k and words[k - 1] in OWN:
             return
@@ -181,12 +181,12 @@ def _join_words(words: list[str]) -> Iterator[_Joined]:
 
 
 def find_cost(wanted: Sequence[str], side: str, readings: Sequence[Reading]) -> float:
-    """Return the cost of reading a name as one of the wanted words, infinite for another name.
+    """Return the cost of interpreting a name as one of some words; it is infinite if none matches.
 
     Args:
-        wanted: words, best first.
-        side: "left", "right" or "".
-        readings: ways to read the name.
+        wanted: accepted words, the best first.
+        side: side of the body: "left", "right" or "".
+        readings: interpretations of the name.
     """
     costs = [
         wanted.index(reading.word) + reading.cost
@@ -197,12 +197,12 @@ def find_cost(wanted: Sequence[str], side: str, readings: Sequence[Reading]) -> 
 
 
 def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
-    """Return the node name of each joint, from entries such as "left_shoulder=lShldr".
+    """Parse node names of joints, from entries such as "left_shoulder=lShldr".
 
-    An entry may also be the name of a TOML file of such lines.
+    An entry may also be the name of a TOML file with such lines.
 
     Raises:
-        ConfigError: an entry is neither, or names no joint.
+        ConfigError: an entry has another format, or names an unknown joint.
     """
     given: dict[str, str] = {}
     for entry in entries:
@@ -222,24 +222,24 @@ def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
 
 
 def find_node(name: object, names: Sequence[str], source: str) -> int:
-    """Return the node of an explicitly given name; upper and lower case are equal."""
+    """Return the index of the node with a name; an exact match is preferred to ignoring case."""
     for exact in (True, False):
         for node, known in enumerate(names):
             if known == name or (not exact and known.lower() == str(name).lower()):
                 return node
-    raise unknown(f"node of {source}", name, names)
+    raise make_unknown_name_error(f"node of {source}", name, names)
 
 
 def find_nodes(joints: Mapping[str, str], names: Sequence[str], source: str) -> dict[str, int]:
-    """Return the nodes of explicitly named joints.
+    """Return the indices of the nodes that are specified for joints.
 
     Args:
         joints: names of the nodes, by joint.
         names: names of all nodes.
-        source: name of the file, for errors.
+        source: name of the file, for error messages.
 
     Raises:
-        ConfigError: a node or joint is unknown, or a node is given for two joints.
+        ConfigError: a node or joint is unknown, or two joints have the same node.
     """
     check_names("joint", joints, NAMED)
     given = {joint: find_node(name, names, source) for joint, name in joints.items()}

@@ -1,4 +1,4 @@
-"""Measures of a recorded person, which reveal the unit and the faults of a file; smoothing."""
+"""Measurements of a recorded person, from which unit and faults are inferred; smoothing."""
 
 from typing import NamedTuple
 
@@ -10,9 +10,9 @@ from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 
 MEASURED_SHARE = 0.755
-"""Shank, thigh and trunk together as a share of stature, from the baked bodies."""
+"""Total length of shank, thigh and trunk as a share of stature, from the baked bodies."""
 STRANGE = 2.0
-"""Ratio to the bone of an adult of the same stature from which a length is a mistake."""
+"""Ratio of a bone's length to that of an adult of equal stature beyond which it is an error."""
 
 
 def midpoint(joints: Points3, part: str) -> Points3:
@@ -26,7 +26,7 @@ def span(joints: Points3, part: str) -> Points3:
 
 
 def measure_bone(joints: Points3, first: str, second: str) -> float:
-    """Return the median distance of two joints over time, the mean of both sides."""
+    """Return the median distance between two joints over time, averaged over both sides."""
     distances = [
         np.linalg.norm(joints[:, JOINT[side + first]] - joints[:, JOINT[side + second]], axis=-1)
         for side in ("left_", "right_")
@@ -35,18 +35,18 @@ def measure_bone(joints: Points3, first: str, second: str) -> float:
 
 
 def measure_legs(joints: Points3) -> float:
-    """Return the length of thigh and shank."""
+    """Return the total length of thigh and shank, averaged over both sides."""
     return measure_bone(joints, "hip", "knee") + measure_bone(joints, "knee", "ankle")
 
 
 def measure_stature(joints: Points3) -> float:
-    """Return an estimate of the person's stature, in the unit of the joints (T, 15, 3)."""
+    """Estimate the person's stature, in the unit of the joints (T, 15, 3)."""
     trunk = np.linalg.norm(midpoint(joints, "shoulder") - midpoint(joints, "hip"), axis=-1)
     return (measure_legs(joints) + float(np.nanmedian(trunk))) / MEASURED_SHARE
 
 
 def check_person(joints: Points3, source: str) -> None:
-    """Refuse joints with a person's stature but not a person's bones; the error names the bone."""
+    """Raise `ConfigError` if the length of a bone is implausible for the person's stature."""
     tall = measure_stature(joints) / 1.75
     for (first, second), usual_m in zip(BONES, BONE_LENGTH_M, strict=True):
         got_m = float(np.median(np.linalg.norm(joints[:, first] - joints[:, second], axis=-1)))
@@ -60,7 +60,7 @@ def check_person(joints: Points3, source: str) -> None:
 
 
 def smooth(values: Floats, sigma_frames: float) -> Floats:
-    """Return values (T, ...) averaged over time with a bell-shaped weight; the ends are held."""
+    """Smooth values (T, ...) over time by a Gaussian filter; the ends are extended."""
     radius = int(np.ceil(3.0 * sigma_frames))
     if radius < 1:
         return values.copy()
@@ -68,11 +68,11 @@ def smooth(values: Floats, sigma_frames: float) -> Floats:
 
 
 def resample(values: Floats, fps: float, wanted_fps: float) -> Floats:
-    """Return values (T, ...) at another rate, by Catmull-Rom splines.
+    """Resample values (T, ...) to another rate by Catmull-Rom splines.
 
     Args:
-        values: values (T, ...), smoothed first where frames are lost.
-        fps: their rate [Hz].
+        values: values (T, ...), which are smoothed first if the rate is reduced.
+        fps: rate of the values [Hz].
         wanted_fps: rate of the result [Hz].
     """
     if wanted_fps < fps:
@@ -86,15 +86,15 @@ def resample(values: Floats, fps: float, wanted_fps: float) -> Floats:
 
 
 class Run(NamedTuple):
-    """An unbroken run of frames."""
+    """A contiguous run of frames."""
 
     first: int
     """First frame."""
     end: int
-    """Frame after the last one."""
+    """Frame after the last frame."""
 
 
 def find_runs(flag: Bools) -> list[Run]:
-    """Return the unbroken runs of True."""
+    """Return the contiguous runs of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]])))
     return [Run(*pair) for pair in edges.reshape(-1, 2).tolist()]

@@ -1,4 +1,4 @@
-"""Joints and segments of a body in any pose of the control vector."""
+"""Forward kinematics from control vectors to joints and segments of a body."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,19 +21,19 @@ STARTS = {
     "knee": "shank",
     "ankle": "foot",
 }
-"""Segment that begins at the centre of a joint."""
+"""Segment with its origin at the centre of each joint, by the joint's name without side."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Where a body carries the 15 joints."""
+    """Positions of the 15 joints on the segments of a body."""
 
     anatomy: Anatomy
-    """Measures of the body."""
+    """Measurements of the body."""
     segment: Ints
     """Segment (15,) that carries each joint."""
     offset: Floats
-    """Position (15, 3) of each joint in that segment's frame [m]."""
+    """Position (15, 3) of each joint in the frame of its segment [m]."""
     rest: Points3
     """Positions (15, 3) of the joints at rest [m]."""
 
@@ -41,7 +41,7 @@ class Marks:
 def make_marks(body: Body, landmarks: bool) -> Marks:
     """Return a body's joints, as BlazePose landmarks or as centres of rotation of its bones.
 
-    Nose and foot tips are BlazePose's in both cases.
+    Nose and foot tips are BlazePose landmarks in both cases.
     """
     segment, offset = body.joint_segment.copy(), body.joint_offset.copy()
     if not landmarks:
@@ -67,7 +67,7 @@ class SegmentPoses(NamedTuple):
     quaternion: QuaternionsWxyz
     """Orientations (T, 22, 4), scalar first."""
     rotation: Rotations
-    """The same orientations as matrices (T, 22, 3, 3)."""
+    """Orientations (T, 22, 3, 3) as rotation matrices."""
 
 
 def pose_segments(q: Floats, bones: Anatomy) -> SegmentPoses:
@@ -82,14 +82,14 @@ def pose_segments(q: Floats, bones: Anatomy) -> SegmentPoses:
 
 @kernel(makes_arrays=True)
 def _pose_each(q: Floats, position: Floats, turn: Floats, matrix: Floats, worker: Worker) -> None:
-    """Write the poses of control vectors, one after the other.
+    """Write the poses of the segments for each control vector.
 
     Args:
         q: control vectors (T, N_CONTROLS).
         position: origins (T, 22, 3), which are written [m].
         turn: quaternions (T, 22, 4), which are written.
         matrix: rotations (T, 22, 3, 3), which are written.
-        worker: record with the measures of the body.
+        worker: record with the measurements of the body.
     """
     for n in range(q.shape[0]):
         worker.q[:] = q[n]

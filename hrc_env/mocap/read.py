@@ -1,4 +1,4 @@
-"""Reading any motion-capture file as a `Capture`."""
+"""Reader of motion-capture files of any supported format."""
 
 import zipfile
 from collections.abc import Mapping
@@ -20,26 +20,26 @@ from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
 CMU_HZ = 120.0
-"""Frame rate of the CMU database's AMC files, which do not contain it [Hz]."""
+"""Frame rate of the AMC files of the CMU database, which do not state it [Hz]."""
 LEAST_S = 0.5
 """Duration of the shortest clip [s]."""
 
 
 class _Content(NamedTuple):
-    """Content of a file, in its own frame and unit."""
+    """Content of a file, in the frame and unit of the file."""
 
     joints: Points3
-    """Joints (T, 15, 3), missing ones NaN."""
+    """Joints (T, 15, 3); missing joints are NaN."""
     fps: float
     """Frame rate [Hz]; NaN if it is not in the file."""
     are_landmarks: bool
-    """Whether joints are BlazePose landmarks, as in `Capture`."""
+    """Whether the joints are BlazePose landmarks, as in `Capture`."""
     node_names: tuple[str, ...]
-    """Name in the file of each joint (15,)."""
+    """Names (15,) of the joints in the file."""
     notes: tuple[str, ...] = ()
     """A sentence for each guess and each repair."""
     rest_up: Floats | None = None
-    """Unit vector (3,) from hips to shoulders of the skeleton at rest; NaN if it does not stand."""
+    """Unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
 
 
 def read_recording(
@@ -55,20 +55,20 @@ def read_recording(
 
     Args:
         path: a .bvh, .amc or .npz file (docs/motion_capture.md).
-        fps: frame rate of the result [Hz]; None for the file's.
-        source_fps: true frame rate of the file [Hz], if it has none or a wrong one.
-        skeleton: the .asf file of an .amc file; None to look for it beside that.
-        allow_off_floor: whether people off one level floor (stairs, terrain, long in the air) are
-            accepted, as if they were on it.
-        joints: names in the file of joints that are not recognized, as {"left_shoulder": "lShldr"}.
-        up: upward axis of the file, as "+y", if it is not recognized.
+        fps: frame rate of the result [Hz]; None for that of the file.
+        source_fps: true frame rate of the file [Hz], if the file states none or a wrong one.
+        skeleton: the .asf file of an .amc file; None to search for it in the same folder.
+        allow_off_floor: whether to accept a person that is not on one level floor (stairs, terrain,
+            long jumps), and to treat the motion as if it were.
+        joints: names of nodes for joints that are not recognized, e.g. {"left_shoulder": "lShldr"}.
+        up: upward axis of the file, such as "+y", if it is not recognized.
 
     Returns:
-        The person's joints (T, 15, 3) [m], +z up, the floor at 0, with notes on repairs.
+        The person's joints (T, 15, 3) [m], with +z up and the floor at 0, and notes on repairs.
 
     Raises:
-        ConfigError: the file is of no known format, damaged beyond repair, of another skeleton or
-            off the floor.
+        ConfigError: the file has an unknown format, is damaged beyond repair or belongs to another
+            skeleton, or the person is not on the floor.
     """
     source = path.name
     read = _read(path, skeleton, joints)
@@ -93,7 +93,7 @@ def read_recording(
 
 
 def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -> _Content:
-    """Return the content of a file."""
+    """Read the content of a file of any supported format."""
     if not path.is_file():
         raise ConfigError(f"{path} is no file.")
     suffix = path.suffix.lower()
@@ -121,16 +121,16 @@ def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -
 
 
 class _Joints(NamedTuple):
-    """Joints in an .npz file."""
+    """Content of an .npz file with joints."""
 
     joints: Points3
-    """Joints (T, 15, 3) in any unit, missing ones NaN."""
+    """Joints (T, 15, 3) in any unit; missing joints are NaN."""
     fps: float
     """Frame rate [Hz]."""
 
 
 def _read_joints(path: Path) -> _Joints:
-    """Return the joints in an .npz file."""
+    """Read the joints and frame rate in an .npz file."""
     wanted = ("joints", "fps")
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -1,4 +1,4 @@
-"""The content of a motion-capture file, in the project's joints, frames and units."""
+"""Content of motion-capture files: skeletons as read, and joints in the project's conventions."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,16 +12,16 @@ FEWEST_FRAMES = 2
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """The joints of a person over time, upright on the floor."""
+    """Joints of a recorded person over time, upright on the floor."""
 
     joints_world: Points3
-    """Joints (T, 15, 3) in the order of `core.skeleton.JOINTS`, +z up, the floor at 0 [m]."""
+    """Joints (T, 15, 3) in the order of `core.skeleton.JOINTS` [m]; +z is up, the floor at 0."""
     fps: float
     """Frame rate [Hz]."""
     are_landmarks: bool
-    """Whether joints are BlazePose landmarks, else centres of rotation of the bones."""
+    """Whether joints are BlazePose landmarks instead of centres of rotation of the bones."""
     node_names: tuple[str, ...]
-    """Name in the file of each joint (15,)."""
+    """Names (15,) of the joints in the file."""
     source: str
     """Name of the file."""
     notes: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class Capture:
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """A skeleton in the frame and the unit of its file: N nodes over T frames."""
+    """Motion of a skeleton of N nodes over T frames, in the frame and unit of its file."""
 
     names: tuple[str, ...]
     """Names (N,) in the file; the tip of a chain has the name of its joint with " end" added."""
@@ -41,13 +41,13 @@ class Moving:
     rotation: Rotations
     """Rotations (T, N, 3, 3) file_from_node."""
     rest: Points3
-    """Origins (N, 3) with every rotation zero [unit of the file]."""
+    """Origins (N, 3) of the nodes if all rotations are zero [unit of the file]."""
     fps: float
-    """Frame rate [Hz]; NaN where the format has none."""
+    """Frame rate [Hz]; NaN if the format does not state it."""
     shift: Points3
-    """Displacement (T, 3) of all nodes if positions of the whole body are meant relative to OFFSET.
+    """Displacement (T, 3) of all nodes if the body's position is relative to its OFFSET.
 
-    It is in the unit of the file.
+    It is in the unit of the file, and not included in `position`.
     """
     notes: tuple[str, ...] = ()
     """A sentence for each guess and each repair."""
@@ -63,7 +63,7 @@ class Repaired(NamedTuple):
 
 
 class TreePose(NamedTuple):
-    """Poses of the nodes of a tree."""
+    """Poses of a tree's nodes in a common frame."""
 
     position: Points3
     """Origins (T, N, 3) of the nodes."""
@@ -72,10 +72,10 @@ class TreePose(NamedTuple):
 
 
 def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
-    """Return the poses of a tree's nodes from those in their parents' frames.
+    """Compose the poses of a tree's nodes from their poses in the parents' frames.
 
     Args:
-        parent: parent (N,) of each node, -1 for none; parents come first.
+        parent: parent (N,) of each node, -1 for none; parents come before their children.
         offset: origins (T, N, 3) or (1, N, 3) in the parents' frames.
         rotation: rotations (T, N, 3, 3) in the parents' frames.
     """
@@ -90,6 +90,6 @@ def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
 
 
 def place_at_rest(parent: Ints, offset: Floats) -> Points3:
-    """Return the origins (N, 3) of the nodes of a tree without rotations."""
+    """Return the origins (N, 3) of a tree's nodes if all rotations are zero."""
     rotation = np.tile(np.eye(3), (1, len(offset), 1, 1))
     return compose_tree(parent, offset[None], rotation).position[0]

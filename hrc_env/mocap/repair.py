@@ -1,4 +1,4 @@
-"""Faults in motion-capture files: repaired if they are unambiguous, refused if not."""
+"""Repair of unambiguous faults in motion-capture files; other faults raise an error."""
 
 from typing import NamedTuple
 
@@ -28,29 +28,29 @@ UNITS: dict[str, float] = {
     "centimetres": 0.01,
     "millimetres": 0.001,
 }
-"""Units of files [m]; the person's stature determines the unit."""
+"""Units of length in files [m]; the unit is inferred from the person's stature."""
 LONGEST_GAP_S = 0.25
-"""Longest time that a joint may be missing [s]: about half a step; judgement."""
+"""Longest time for which a joint may be missing [s]: about half a step; judgement."""
 STEADY = 0.8
-"""Least component along one axis of the mean direction from ankles to shoulders."""
+"""Least component of the mean direction from ankles to shoulders along the upward axis."""
 STRAIGHT = 0.9
-"""Component of the direction from ankles to shoulders from which a person stands along an axis."""
+"""Least component of a standing person's direction from ankles to shoulders along an axis."""
 UPRIGHT_SHARE = 0.5
-"""Vertical component of the direction from ankles to shoulders from which a person is upright."""
+"""Least vertical component of the direction from ankles to shoulders of an upright person."""
 BEGIN = 5
-"""Least number of consecutive frames in which a person stands along an axis."""
+"""Number of initial frames that are averaged, and least number of standing or upright frames."""
 ON_FLOOR = 0.15
-"""Greatest height of the ankles of a person on the file's floor, as a share of stature."""
+"""Greatest ankle height of a person on the file's floor, as a share of stature."""
 OFF_FLOOR = 0.25
-"""Least height of the ankles of a person off the file's floor, as a share of stature."""
+"""Least ankle height of a person off the file's floor, as a share of stature."""
 KNEES = 0.1
-"""Mean bend of the knees up to which legs are straight, as a share of a shank."""
+"""Greatest mean bend of the knees for straight legs, as a share of a shank."""
 JUMP = 6.0
-"""Ratio of the first frame's jump to the following ones from which it is another pose."""
+"""Ratio of the first frame's jump to later ones above which the first frame is a rest pose."""
 AFTER = 6
-"""Number of frames with which the first frame's jump is compared."""
+"""Number of later frames with which the first frame's jump is compared."""
 JUMP_M = 0.03
-"""Least mean movement of the joints in the first frame's jump [m]."""
+"""Least mean movement of the joints after a rest pose in the first frame [m]."""
 UPRIGHT = {
     "+x": about_axis("y", -np.pi / 2),
     "-x": about_axis("y", np.pi / 2),
@@ -58,16 +58,16 @@ UPRIGHT = {
     "-y": about_axis("x", -np.pi / 2),
     "-z": about_axis("x", np.pi),
 }
-"""Rotations that take an axis to +z."""
+"""Rotations that take each axis to +z."""
 
 
 class Upward(NamedTuple):
-    """Sources of the upward axis of a file beside the motion itself."""
+    """Information on a file's upward axis in addition to the motion."""
 
     given: str | None = None
-    """Name of the axis, such as "+y", if it is given explicitly."""
+    """Name of the axis, such as "+y", if it is specified explicitly."""
     at_rest: Floats | None = None
-    """Unit vector (3,) from hips to shoulders of a standing skeleton at rest; else NaN."""
+    """Unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
 
 
 def repair_joints(
@@ -78,17 +78,17 @@ def repair_joints(
     off_floor: bool = False,
     upward: Upward | None = None,
 ) -> Repaired:
-    """Return joints that are complete, in metres, upright, not mirrored, on the floor.
+    """Return joints that are complete, in metres, upright, not mirrored and on the floor.
 
-    A rest pose at the beginning is left out.
+    A rest pose at the beginning is removed.
 
     Args:
-        joints: joints (T, 15, 3) in the frame and the unit of the file, missing ones NaN.
+        joints: joints (T, 15, 3) in the frame and unit of the file; missing joints are NaN.
         fps: frame rate [Hz].
-        source: name of the file, for errors.
+        source: name of the file, for error messages.
         at_zero: whether the file's floor is at 0 by convention, see `footing.put_on_floor`.
-        off_floor: whether people off one level floor are accepted.
-        upward: sources of the upward axis.
+        off_floor: whether a person that is not on one level floor is accepted.
+        upward: information on the upward axis.
 
     Raises:
         ConfigError: a fault cannot be repaired.
@@ -105,9 +105,9 @@ def repair_joints(
 
 
 def add_shift(joints: Points3, shift: Points3) -> Repaired:
-    """Return joints displaced by `shift` (T, 3) if only then the feet are on a floor at 0.
+    """Displace joints by `shift` (T, 3) if the feet are on a floor at 0 only with this shift.
 
-    Joints and shift are in the frame and the unit of the file.
+    Joints and shift are in the frame and unit of the file.
     """
     way = midpoint(joints, "shoulder") - midpoint(joints, "ankle")
     axis = int(np.argmax(np.abs(np.nanmean(way, axis=0))))
@@ -123,7 +123,7 @@ def add_shift(joints: Points3, shift: Points3) -> Repaired:
 
 
 def fill_gaps(joints: Points3, fps: float, source: str) -> Repaired:
-    """Return joints whose short gaps (NaN) are filled by straight lines."""
+    """Fill short gaps (NaN) in joints by linear interpolation."""
     filled, names = joints.copy(), list[str]()
     for j, joint in enumerate(JOINTS):
         known: Bools = ~np.isnan(joints[:, j].sum(-1))
@@ -145,7 +145,7 @@ def fill_gaps(joints: Points3, fps: float, source: str) -> Repaired:
 
 
 def convert_to_metres(joints: Points3, source: str) -> Repaired:
-    """Return joints in metres, by the person's stature."""
+    """Convert joints to metres; the unit is inferred from the person's stature."""
     tall = measure_stature(joints)
     for name, unit_m in UNITS.items():
         if STATURES_M[0] < tall * unit_m < STATURES_M[1]:
@@ -158,7 +158,7 @@ def convert_to_metres(joints: Points3, source: str) -> Repaired:
 
 
 def turn_upright(joints: Points3, source: str, upward: Upward | None = None) -> Repaired:
-    """Return joints turned so that the person stands along +z."""
+    """Rotate joints so that the person stands along +z."""
     given, at_rest = upward or Upward()
     name = _find_upward_axis(joints, source, at_rest) if given is None else given
     name = name if name[:1] in ("+", "-") else f"+{name}"
@@ -173,8 +173,8 @@ def turn_upright(joints: Points3, source: str, upward: Upward | None = None) -> 
 def _find_upward_axis(joints: Points3, source: str, at_rest: Floats | None) -> str:
     """Return the name of the upward axis.
 
-    It is that of the skeleton at rest if the person stands along it at some time (as before a
-    fall), else the mean direction of the body, else the first one.
+    It is that of the rest pose if the person stands along it for some frames (as before a fall).
+    Otherwise it is the mean direction of the body, or that at the beginning.
     """
     way = midpoint(joints, "shoulder") - midpoint(joints, "ankle")
     way /= np.linalg.norm(way, axis=-1, keepdims=True)
@@ -196,18 +196,18 @@ def _find_upward_axis(joints: Points3, source: str, at_rest: Floats | None) -> s
 
 
 def _name_axis(way: Floats) -> str:
-    """Return the name of the axis that a vector (3,) is nearest to."""
+    """Return the name of the axis nearest to a vector (3,)."""
     axis = int(np.argmax(np.abs(way)))
     return ("+" if way[axis] > 0.0 else "-") + "xyz"[axis]
 
 
 def _make_unit_vector(axis: str) -> Floats:
-    """Return the unit vector (3,) of a name such as "-y"."""
+    """Return the unit vector (3,) of an axis with a name such as "-y"."""
     return np.eye(3)["xyz".index(axis[1])] * (1.0 if axis[0] == "+" else -1.0)
 
 
 def undo_mirroring(joints: Points3, source: str) -> Repaired:
-    """Return the joints of a person, where two axes (or left and right) had been exchanged."""
+    """Undo an exchange of two axes, or of left and right, in joints."""
     feet, knees = _measure_forward(joints)
     if feet > 0.0 and knees > -KNEES:
         return Repaired(joints, ())
@@ -222,18 +222,18 @@ def undo_mirroring(joints: Points3, source: str) -> Repaired:
 
 
 class _Forward(NamedTuple):
-    """Forward components of feet and knees; negative for the mirror image of a person."""
+    """Forward components of feet and knees; they are negative for the mirror image of a person."""
 
     feet: float
-    """Mean component of the feet, as a share of their length."""
+    """Median forward component of the feet, as a share of their length."""
     knees: float
-    """Mean bend of the knees, as a share of a shank."""
+    """Mean forward bend of the knees, as a share of a shank."""
 
 
 def _measure_forward(joints: Points3) -> _Forward:
-    """Return how far feet point, and knees bend, to the front as left-hand side and up define it.
+    """Return the forward components of feet and knees; forward is inferred from left and up.
 
-    Only upright frames count; if there are hardly any, the trunk's axis stands for up.
+    Only upright frames count. With fewer than `BEGIN` such frames, the trunk's axis replaces up.
     """
     way = midpoint(joints, "shoulder") - midpoint(joints, "ankle")
     upright = way[:, 2] > UPRIGHT_SHARE * np.linalg.norm(way, axis=-1)
@@ -252,16 +252,16 @@ def _measure_forward(joints: Points3) -> _Forward:
 
 
 class FirstFrame(NamedTuple):
-    """Where the motion of a recording begins."""
+    """Beginning of the motion in a recording."""
 
     frame: int
     """First frame of the motion."""
     notes: tuple[str, ...]
-    """A sentence if frames are left out."""
+    """A sentence if a frame is removed."""
 
 
 def skip_rest_pose(joints: Points3) -> FirstFrame:
-    """Return the first frame of the motion: 1 if frame 0 is a rest pose (a T, mostly), else 0."""
+    """Return the motion's first frame: 1 if frame 0 is a rest pose (often a T-pose), else 0."""
     shape = joints - joints[:, [JOINT["left_hip"]]]
     jumps = np.linalg.norm(np.diff(shape, axis=0), axis=-1).mean(-1)
     if jumps[0] > max(JUMP_M, JUMP * jumps[1:AFTER].max(initial=0.0)):

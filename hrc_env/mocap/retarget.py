@@ -1,8 +1,8 @@
-"""From a recording to a clip for a worker, and the distances of the worker's joints from it.
+"""Retargeting of a recording to a clip of a worker, and the remaining errors of the joints.
 
-Paths scale with the legs; trunk, arms and head keep their directions and take the worker's lengths.
-Then damped least squares find the control vector of each frame. Columns that 15 joints do not
-determine are held near usual values and near the frames before and after.
+Paths scale with the legs; trunk, arms and head keep their directions, with the worker's lengths.
+Damped least squares determine the control vector of each frame. Columns that 15 joints do not
+determine are held near usual values and near those of adjacent frames.
 """
 
 from collections.abc import Callable
@@ -25,19 +25,19 @@ from hrc_env.worker.body import Body, load_body
 STILL_M_S = 0.15
 """Speed below which an ankle may stand [m/s]."""
 LOW_SHARE = 40.0
-"""Percentile of the heights of an ankle below which it may stand."""
+"""Percentile of an ankle's heights below which it may stand."""
 OnProgress: TypeAlias = Callable[[float], None]
-"""Receives the increase of the share of the work that is done."""
+"""Callback that receives each increase of the completed share of the work."""
 ROUNDS = 12
-"""Number of steps of the fit; after eight it changes by less than a millimetre."""
+"""Number of iterations of the fit; after eight it changes by less than a millimetre."""
 FRAMES = 256
-"""Number of frames that are fitted together."""
+"""Number of frames that are fitted in one batch."""
 STEP = 1e-4
-"""Step of the difference quotients [m or rad]."""
+"""Step of the finite differences [m or rad]."""
 FARTHEST = 0.25
-"""Greatest change of a column in a round [m or rad]."""
+"""Greatest change of a column in one iteration [m or rad]."""
 SMOOTH_S = 0.05
-"""Time over which neighbouring frames are pulled together [s]."""
+"""Standard deviation of the smoothing towards which columns are pulled [s]."""
 
 WEIGHT: dict[str, float] = {
     "nose": 0.7,
@@ -49,7 +49,7 @@ WEIGHT: dict[str, float] = {
     "ankle": 3.0,
     "foot": 0.7,
 }
-"""Weight of the error of a joint; judgement: feet and hands touch objects."""
+"""Weight of the error of each joint; judgement: feet and hands touch objects."""
 PULL: dict[int, float] = {
     c.PELVIS_PITCH: 0.05,
     c.SPINE_FLEX: 0.02,
@@ -62,46 +62,46 @@ PULL: dict[int, float] = {
     c.SWIVEL: 0.01,
     c.SWIVEL + 1: 0.01,
 }
-"""Joint error that a column's deviation from its usual value equals [m/rad]."""
+"""Joint error that is equivalent to a column's deviation from its usual value [m/rad]."""
 SLIGHT = 1e-3
-"""The same factor for every other column [m/rad]."""
+"""Value of `PULL` for every other column [m/rad]."""
 FITTED = np.array(
     [c.ROOT_X, c.ROOT_Y, *range(c.PELVIS_Z, c.N_BLENDED)]
     + [c.ANKLE + 6 * side + k for side in range(2) for k in range(5)]
 )
-"""Columns that are fitted: those of a clip except the heading and the toes."""
+"""Fitted columns: those of a clip except the heading and the toes."""
 
 
 @dataclass(frozen=True, slots=True)
 class RetargetError:
-    """Distances of the worker's joints from the person's, in the worker's size."""
+    """Distances between the worker's joints and the recorded ones, scaled to the worker's size."""
 
     mean_m: Floats
-    """Mean (15,) over the frames [m]."""
+    """Mean distance (15,) over the frames [m]."""
     p95_m: Floats
-    """95th percentile (15,) over the frames [m]."""
+    """95th percentile (15,) of the distance over the frames [m]."""
     scale: float
     """Size of the worker relative to the person."""
     slip_m_s: float
-    """95th percentile of the speed of the balls of standing feet [m/s]; NaN if none stands."""
+    """95th percentile of the speed of standing feet's balls [m/s]; NaN if no foot stands."""
 
 
 class Retargeted(NamedTuple):
     """A clip made from a recording."""
 
     clip: Clip
-    """The clip."""
+    """Clip of the worker."""
     error: RetargetError
-    """Distances of the worker's joints from the person's."""
+    """Distances between the worker's joints and the recorded ones."""
 
 
 class Alignment(NamedTuple):
-    """The best similarity between two recordings."""
+    """Best similarity transformation between two recordings."""
 
     scale: float
-    """Size of the second one relative to the first one."""
+    """Size of the second recording relative to the first."""
     distance_m: Floats
-    """Distances (T, 15) of the joints after it [m]."""
+    """Distances (T, 15) between the joints after the transformation [m]."""
 
 
 def retarget(
@@ -109,15 +109,15 @@ def retarget(
     body: Body | str = "worker_1",
     on_progress: OnProgress = lambda share: None,
 ) -> Retargeted:
-    """Fit a worker's body to a recorded person, so that workers can do what the person did.
+    """Convert a recording to a clip by fitting a worker's body to the recorded person.
 
     Args:
-        capture: the recording, from `read_recording`.
-        body: the worker, or a name; others play the clip, too, scaled to their legs and arms.
-        on_progress: called with each increase of the share of the work that is done.
+        capture: recording, from `read_recording`.
+        body: body or name of a worker; other workers can play the clip, too, scaled to their size.
+        on_progress: called with each increase of the completed share of the work.
 
     Returns:
-        The clip, and the distances of the worker's joints from the person's [m].
+        The clip, and the distances between the worker's joints and the recorded ones [m].
 
     Raises:
         ConfigError: there is no worker of that name.
@@ -138,9 +138,9 @@ def retarget(
 
 
 def align(source: Points3, done: Points3) -> Alignment:
-    """Return the best similarity of two recordings (T, 15, 3).
+    """Return the best similarity transformation between two recordings (T, 15, 3).
 
-    The method is Umeyama's, IEEE PAMI 13(4), 1991.
+    The method is by Umeyama, IEEE PAMI 13(4), 1991.
     """
     a, b = source.reshape(-1, 3), done.reshape(-1, 3)
     a0, b0 = a - a.mean(0), b - b.mean(0)
@@ -154,7 +154,7 @@ def align(source: Points3, done: Points3) -> Alignment:
 
 
 def scale_joints(joints: Points3, fps: float, marks: Marks) -> Points3:
-    """Return the positions (T, 15, 3) that the worker's joints should have [m].
+    """Return the desired positions (T, 15, 3) of the worker's joints [m].
 
     Args:
         joints: joints (T, 15, 3) of the person [m].
@@ -193,14 +193,14 @@ def scale_joints(joints: Points3, fps: float, marks: Marks) -> Points3:
 
 
 def _set_pair(target: Points3, part: str, centre: Points3, source: Points3, rest: Points3) -> None:
-    """Set a pair of joints about its middle, along the person's axis, as wide as the worker.
+    """Set a pair of joints about its midpoint, along the person's axis at the worker's width.
 
     Args:
         target: joints (T, 15, 3), which are changed.
         part: name of the pair.
-        centre: its middle (T, 3).
-        source: joints (T, 15, 3) with the axis.
-        rest: joints (15, 3) with the width.
+        centre: midpoint (T, 3) of the pair.
+        source: joints (T, 15, 3) that define the axis.
+        rest: joints (15, 3) that define the width.
     """
     half = 0.5 * _set_length(span(source, part), float(np.linalg.norm(span(rest, part))))
     target[:, JOINT[f"left_{part}"]] = centre + half
@@ -208,12 +208,15 @@ def _set_pair(target: Points3, part: str, centre: Points3, source: Points3, rest
 
 
 def _set_length(way: Points3, metres: float) -> Points3:
-    """Return vectors of the same direction and another length [m]."""
+    """Return vectors of the same directions, scaled to a length [m]."""
     return way * (metres / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9))
 
 
 def _find_standing(ankle: Points3, fps: float) -> Bools:
-    """Return the frames (T,) in which an ankle stands on the floor; at least the lowest ones."""
+    """Return a mask (T,) of the frames in which an ankle stands on the floor.
+
+    With fewer than three such frames, return the lowest 5 % instead.
+    """
     speed = np.linalg.norm(np.gradient(ankle, 1.0 / fps, axis=0), axis=-1)
     low = ankle[:, 2] <= np.percentile(ankle[:, 2], LOW_SHARE)
     still = low & (speed < STILL_M_S)
@@ -221,7 +224,7 @@ def _find_standing(ankle: Points3, fps: float) -> Bools:
 
 
 def _adapt_foot(way: Points3, standing: Bools, rest: Floats) -> Points3:
-    """Return ankle to foot tip (T, 3) as the person's, but flat where they stand flat."""
+    """Return the vector (T, 3) from ankle to foot tip like the person's, but flat in stance."""
     level = np.hypot(way[:, 0], way[:, 1])
     pitch = np.arctan2(way[:, 2], level)
     flat = np.arctan2(rest[2], np.hypot(rest[0], rest[1]))
@@ -234,13 +237,13 @@ def _adapt_foot(way: Points3, standing: Bools, rest: Floats) -> Points3:
 def fit_controls(
     joints: Points3, fps: float, marks: Marks, on_progress: OnProgress = lambda share: None
 ) -> Floats:
-    """Return the control vectors (T, N_CONTROLS) of a worker with given joints.
+    """Fit the control vectors (T, N_CONTROLS) of a worker to given joints.
 
     Args:
-        joints: joints (T, 15, 3) that the worker should have [m].
+        joints: desired joints (T, 15, 3) of the worker [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
-        on_progress: called with each increase of the share of the work that is done.
+        on_progress: called with each increase of the completed share of the work.
     """
     q = guess_controls(joints, fps, marks)
     weight = np.array([WEIGHT[joint.split("_")[-1]] for joint in JOINTS])[:, None]
@@ -265,11 +268,11 @@ def _find_usual(q: Floats, fps: float) -> Floats:
 def _improve(
     q: Floats, joints: Points3, usual: Floats, weight: Floats, pull: Floats, marks: Marks
 ) -> None:
-    """Change some frames by one Gauss-Newton step.
+    """Improve some frames by one damped Gauss-Newton step.
 
     Args:
         q: control vectors (n, N_CONTROLS), which are changed.
-        joints: joints (n, 15, 3) that the worker should have [m].
+        joints: desired joints (n, 15, 3) of the worker [m].
         usual: values (n, F) towards which the fitted columns are pulled.
         weight: weight (15, 1) of each joint.
         pull: strength (F,) of the pull.

@@ -15,15 +15,15 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-"""Byte order marks and the encodings that they announce, the longer ones first."""
+"""Byte order marks and the encodings that they indicate."""
 INSPECTED = 400
-"""Number of bytes at the beginning of a file by which UTF-16 without a mark is recognized."""
+"""Number of initial bytes of a file from which UTF-16 without a mark is recognized."""
 NO_NUMBER = re.compile(r"[-+]?(1\.#\w+|nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
-"""Spellings of missing values: not a number, or not finite."""
+"""Regular expression of missing values: not a number, or not finite."""
 
 
 def decode(data: bytes) -> str:
-    """Return the text of a file in UTF-8, UTF-16 or UTF-32, with or without a mark, or Latin-1."""
+    """Decode text in UTF-8, UTF-16 or UTF-32, with or without a byte order mark, or in Latin-1."""
     for mark, encoding in MARKS:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, errors="replace").strip("\0\x1a")
@@ -38,10 +38,10 @@ def decode(data: bytes) -> str:
 
 
 def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str]:
-    """Return the numbers in words, each with a decimal point; "," and ";" may be in between.
+    """Split words into numbers with decimal points; "," and ";" may be separators.
 
-    A comma is the decimal sign if there are `count` numbers then, else it separates them. If the
-    count is not known, it separates them where one word has two commas, or a comma and a point.
+    A comma is a decimal sign if this results in `count` numbers, else a separator. If the count is
+    unknown, a comma is a separator if a word has two commas, or a comma and a point.
     """
     if not any("," in word or ";" in word for word in words):
         return list(words)
@@ -54,22 +54,22 @@ def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str
 
 
 def to_number(word: str) -> float:
-    """Return the number of a word, NaN for a missing value; `ValueError` for any other word."""
+    """Convert a word to a number, NaN for a missing value; raise `ValueError` for other words."""
     return math.nan if NO_NUMBER.fullmatch(word) else float(word)
 
 
 class Rows:
-    """The lines of a text file that contain words, in order; errors give the line."""
+    """Reader of the non-empty lines of a text file; its error messages contain the line."""
 
     def __init__(self, path: Path, comments: str = "") -> None:
-        """Read a file without its comments, each of which begins with a match of `comments`."""
+        """Read a file and remove comments, which begin with a match of the pattern `comments`."""
         self.source = path.name
         self._lines = decode(path.read_bytes()).splitlines()
         self._comment = re.compile(rf"(?:^|\s)(?:{comments}).*") if comments else None
         self.at = 0
 
     def next(self, expected: str) -> list[str]:
-        """Return the words of the next line that has any; `ConfigError` at the end of the file."""
+        """Return the words of the next non-empty line; raise `ConfigError` at the file's end."""
         for words in self.remaining():
             return words
         raise ConfigError(
@@ -77,7 +77,7 @@ class Rows:
         )
 
     def remaining(self) -> Iterator[list[str]]:
-        """Yield the words of each remaining line that has any."""
+        """Yield the words of each remaining non-empty line."""
         while self.at < len(self._lines):
             line = self._lines[self.at]
             words = (self._comment.sub("", line) if self._comment else line).split()
@@ -86,19 +86,19 @@ class Rows:
                 yield words
 
     def make_error(self, expected: str) -> ConfigError:
-        """Return the error for the line that was read last."""
+        """Return an error for the line that was read last."""
         line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
         return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
 
     def to_numbers(self, words: Sequence[str], count: int | None = None) -> list[float]:
-        """Return words of the line that was read last as numbers.
+        """Convert words of the line that was read last to numbers.
 
         Args:
-            words: the words.
-            count: number of numbers, if it is known.
+            words: words of the line.
+            count: expected number of numbers; None if unknown.
 
         Raises:
-            ConfigError: a word is no number, or there are too few.
+            ConfigError: a word is not a number, or there are too few.
         """
         try:
             values = [to_number(word) for word in separate_numbers(words, count)]

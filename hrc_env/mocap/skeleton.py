@@ -1,4 +1,4 @@
-"""The nodes of a file's skeleton that are the 15 joints, and the position of its nose."""
+"""Assignment of a skeleton's nodes to the 15 joints, and the position of the nose."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -21,43 +21,43 @@ CHAINS = tuple(
     for side in ("left", "right")
     for parts in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "foot"))
 )
-"""Joints of each limb; each is below the one before in the tree."""
+"""Joints of each limb; each joint is a descendant of the one before in the tree."""
 CHOICES = 6
-"""Number of nodes considered for a joint, the best by name."""
+"""Number of candidate nodes for a joint, the best by name."""
 NOSE_SHARE = 0.065
-"""Distance of the nose ahead of the head's joint, as a share of stature (the baked bodies)."""
+"""Distance of the nose ahead of the head's joint, as a share of stature of the baked bodies."""
 STANDS = -0.7
-"""Cosine of the angle between trunk and thighs below which a rest pose stands."""
+"""Cosine of the angle between trunk and thighs below which a rest pose is a standing pose."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointNodes:
-    """The nodes of a skeleton that are the joints."""
+    """Nodes of a skeleton that represent the joints."""
 
     node: dict[str, int]
-    """Node of each joint; of the nose only if the file has one."""
+    """Index of the node of each joint; the nose is contained only if the file has one."""
     head: int
-    """Node that turns with the face."""
+    """Index of the node that rotates with the face."""
     notes: tuple[str, ...] = ()
-    """A sentence for each joint that was recognized by the structure and not by its name."""
+    """A sentence for each joint that was recognized by the skeleton's structure, not its name."""
 
 
 class _Candidate(NamedTuple):
-    """A node that may be a joint by its name."""
+    """A node that may represent a joint, judging by its name."""
 
     cost: float
-    """Cost of reading its name as the joint's."""
+    """Cost of interpreting the node's name as that of the joint."""
     node: int
     """Index of the node."""
 
 
 def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = None) -> JointNodes:
-    """Return the node of each joint, by the names of the nodes and the structure of the skeleton.
+    """Find the node of each joint by the names of the nodes and the structure of the skeleton.
 
     Args:
         moving: skeleton of a file.
-        source: name of the file, for errors.
-        joints: explicit names of nodes, by joint (`NAMED`).
+        source: name of the file, for error messages.
+        joints: explicit names of nodes, by joint (`names.NAMED`).
 
     Raises:
         ConfigError: a joint is missing; the message lists those that were found.
@@ -95,7 +95,7 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
 
 
 def _list_candidates(joint: str, readings: list[list[Reading]]) -> list[_Candidate]:
-    """Return the nodes that may be a joint by their names, the best first."""
+    """Return the nodes that may represent a joint by their names, the best first."""
     side, _, part = joint.partition("_")
     words, side = (SIDED[part], side) if part else ((joint,), "")
     costs = [find_cost(words, side, ways) for ways in readings]
@@ -113,7 +113,7 @@ def _list_ancestors(node: int, parent: list[int]) -> list[int]:
 def _choose_chain(
     chain: tuple[str, ...], known: dict[str, list[_Candidate]], parent: list[int]
 ) -> dict[str, int]:
-    """Return the cheapest nodes for a limb's joints, each below the one before; empty if none fit.
+    """Return the nodes of a limb's joints at least cost, each below the one before; or no nodes.
 
     Args:
         chain: joints of the limb.
@@ -134,9 +134,9 @@ def _choose_chain(
 def _infer_middle_joints(
     known: dict[str, list[_Candidate]], names: tuple[str, ...], parent: list[int]
 ) -> Iterator[str]:
-    """Infer elbows and knees that neither side has a known name for, and yield a sentence for each.
+    """Infer elbows and knees without a known name on both sides, and yield a sentence for each.
 
-    The only node between shoulder and wrist, or hip and ankle, is added to the candidates.
+    The only node between shoulder and wrist, or between hip and ankle, becomes the candidate.
 
     Args:
         known: candidates of each joint, to which the nodes are added.
@@ -163,14 +163,14 @@ def _infer_middle_joints(
 
 
 def _find_head(readings: list[list[Reading]]) -> int | None:
-    """Return the node that is called a head, if there is one."""
+    """Return the node with the name of a head, if there is one."""
     costs = [find_cost(HEAD, "", ways) for ways in readings]
     best = int(np.argmin(costs))
     return best if costs[best] < np.inf else None
 
 
 def _find_top(nodes: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
-    """Return the last node of the only middle branch above the shoulders, if there is one.
+    """Return the last node of the unique central branch above the shoulders, if there is one.
 
     Args:
         nodes: nodes of the joints.
@@ -197,7 +197,7 @@ def _find_top(nodes: dict[str, int], names: tuple[str, ...], parent: list[int]) 
 
 
 def extract_joints(moving: Moving, nodes: JointNodes) -> Points3:
-    """Return the joints (T, 15, 3) in the frame and unit of the file; a missing nose is made."""
+    """Return the joints (T, 15, 3) in the file's frame and unit; a missing nose is constructed."""
     order = [nodes.node.get(joint, nodes.head) for joint in JOINTS]
     joints = moving.position[:, order].copy()
     if JOINTS[0] not in nodes.node:
@@ -209,7 +209,7 @@ def extract_joints(moving: Moving, nodes: JointNodes) -> Points3:
 
 
 def find_rest_up(moving: Moving, nodes: JointNodes) -> Points3:
-    """Return the unit vector (3,) from hips to shoulders at rest; NaN unless it stands."""
+    """Return the unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
     rest = moving.rest[[nodes.node.get(joint, nodes.head) for joint in JOINTS]]
     if not _is_standing(rest):
         return np.full(3, np.nan)
@@ -220,14 +220,14 @@ def find_rest_up(moving: Moving, nodes: JointNodes) -> Points3:
 def _find_face_direction(joints: Points3, moving: Moving, rest: Points3, head: int) -> Floats:
     """Return the face's direction (3,) in the head's frame.
 
-    It is taken from the rest pose if that stands, else from the mean forward direction of the
-    chest.
+    It is taken from the rest pose if that is a standing pose, else from the trunk's mean forward
+    direction in the motion.
 
     Args:
         joints: joints (T, 15, 3).
         moving: skeleton of the file.
         rest: joints (15, 3) at rest.
-        head: node that turns with the face.
+        head: node that rotates with the face.
     """
     if _is_standing(rest):
         return _find_forward(rest)
@@ -237,7 +237,7 @@ def _find_face_direction(joints: Points3, moving: Moving, rest: Points3, head: i
 
 
 def _is_standing(rest: Points3) -> bool:
-    """Return whether a rest pose (15, 3) has its legs below its trunk and its shoulders apart."""
+    """Return whether a rest pose (15, 3) has its legs below the trunk and its shoulders apart."""
     if rest.shape != (N_JOINTS, 3):
         return False
     trunk = midpoint(rest, "shoulder") - midpoint(rest, "hip")
@@ -248,7 +248,7 @@ def _is_standing(rest: Points3) -> bool:
 
 
 def _find_forward(joints: Points3) -> Points3:
-    """Return unit vectors (..., 3) forward of a trunk; the feet decide on the sign."""
+    """Return unit vectors (..., 3) forward of a trunk; the feet determine the sign."""
     trunk = midpoint(joints, "shoulder") - midpoint(joints, "hip")
     ahead = np.cross(span(joints, "shoulder") + span(joints, "hip"), trunk)
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)

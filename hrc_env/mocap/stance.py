@@ -1,7 +1,7 @@
-"""Standing feet: found in a fitted motion, and locked so that they do not slide.
+"""Detection of standing feet in a fitted motion, and their fixation against sliding.
 
-A foot stands while its footprint, where the ankle of a flat foot would be, rests. The footprint is
-then set to one place, and the change fades out in the swings before and after.
+A foot stands while its footprint, the ankle's pose if the foot were flat, is at rest. The footprint
+is then set to one pose, and the correction fades out in the swings before and after.
 """
 
 from typing import NamedTuple
@@ -18,35 +18,35 @@ from hrc_env.motion.curves import decay
 from hrc_env.worker.body import SEGMENT
 
 RESTS_M_S = 0.2
-"""Speed below which a footprint rests [m/s]; a small step moves it at 0.3, a stride at 2."""
+"""Speed below which a footprint is at rest [m/s]; small steps have 0.3 m/s, strides 2 m/s."""
 LEAST_S = 0.1
-"""Duration of the shortest stance, and twice that of the shortest gap [s]."""
+"""Duration of the shortest stance, and twice that of the shortest swing [s]."""
 FADE_S = 0.25
 """Time in which a correction fades out in a swing [s]."""
 SMOOTH_S = 0.02
-"""Time over which speeds are smoothed, against the jitter of recordings [s]."""
+"""Standard deviation of the smoothing of footprints, against jitter in recordings [s]."""
 FLOOR_M = 0.06
-"""Height below which a resting foot stands on the floor, else on an object of its height [m]."""
+"""Height below which a foot at rest stands on the floor and not on an object [m]."""
 FLAT_RAD = 0.01
-"""Pitch of the toes beyond which a foot stands on its heel [rad]."""
+"""Upward pitch of the toes beyond which a foot stands on its heel [rad]."""
 
 
 class LockedFeet(NamedTuple):
-    """Control vectors with feet that stand still."""
+    """Control vectors with standing feet that do not slide."""
 
     controls: Floats
     """Control vectors (T, N_CONTROLS)."""
     stands: Bools
-    """Whether the left and the right foot stand (T, 2)."""
+    """Mask (T, 2) of whether the left and the right foot stand."""
 
 
 def lock_feet(q: Floats, fps: float, size: Floats) -> LockedFeet:
-    """Return control vectors with feet that stand still.
+    """Fix the standing feet in control vectors, so that they do not slide.
 
     Args:
         q: control vectors (T, N_CONTROLS).
         fps: frame rate [Hz].
-        size: lengths (N_SIZES,) of the body [m].
+        size: dimensions (N_SIZES,) of the body [m].
     """
     out, stands = q.copy(), np.zeros((len(q), 2), bool)
     for side in range(2):
@@ -66,13 +66,13 @@ def lock_feet(q: Floats, fps: float, size: Floats) -> LockedFeet:
 
 
 def measure_slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
-    """Return the speeds of the balls of standing feet along the floor, one a frame and foot [m/s].
+    """Return the horizontal speeds of standing feet's balls, one per frame and foot [m/s].
 
     Args:
         q: control vectors (T, N_CONTROLS).
-        stands: whether each foot stands (T, 2).
+        stands: mask (T, 2) of standing feet.
         fps: frame rate [Hz].
-        anatomy: measures of the body.
+        anatomy: measurements of the body.
     """
     position = pose_segments(q, anatomy).position
     speeds = []
@@ -85,7 +85,7 @@ def measure_slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floa
 
 
 def _find_stances(footprint: Floats, fps: float) -> list[Run]:
-    """Return the frames of each stance."""
+    """Return the run of frames of each stance."""
     rate = np.gradient(smooth(footprint[:, :3], SMOOTH_S * fps), 1.0 / fps, axis=0)
     rests = np.linalg.norm(rate, axis=-1) < RESTS_M_S
     for first, last in find_runs(~rests):
@@ -98,10 +98,10 @@ def _find_stances(footprint: Floats, fps: float) -> list[Run]:
 def _correct_footprints(
     footprint: Floats, stances: list[Run], fps: float, floor_m: float
 ) -> Floats:
-    """Return the change (T, 4) that brings footprints to one place a stance, fading in between.
+    """Return corrections (T, 4) that fix footprints in each stance and fade out in the swings.
 
     Args:
-        footprint: x, y, z [m], heading [rad] of a foot (T, 4).
+        footprint: footprint (T, 4) of a foot: x, y, z [m], heading [rad].
         stances: frames of each stance.
         fps: frame rate [Hz].
         floor_m: height of the ankle of a foot on the floor [m].
@@ -122,12 +122,12 @@ def _correct_footprints(
 
 
 def _fade(n: int, value: Floats, rate: Floats, fps: float) -> Floats:
-    """Return the values (n, 4) of the frames after one, falling to zero within them.
+    """Return values (n, 4) that decay from the value in the frame before to zero.
 
     Args:
         n: number of frames.
-        value: value (4,) in that frame.
-        rate: its rate (4,) [1/s].
+        value: value (4,) in the frame before the first.
+        rate: rate of change (4,) in the frame before the first [1/s].
         fps: frame rate [Hz].
     """
     lasts, out = min(FADE_S, (n + 1) / fps), np.empty((n, 4))

@@ -1,1 +1,1 @@
-"""The worker's motion: behaviour to activities to a control vector to 22 body segments."""
+"""Workers' motion: from behaviour and activities to control vectors and 22 body segments."""

@@ -1,4 +1,4 @@
-"""A worker's bones for the kinematics: rest offsets, rest frames and lengths."""
+"""Bones of a worker for the kinematics: offsets and frames at rest, and body dimensions."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,54 +9,55 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.worker.body import N_SEGMENTS, PARENT, Body
 
 CHEST, HEAD = 3, 5
-"""Segments of the trunk that limbs and gaze refer to."""
+"""Segments of the trunk to which limbs and gaze refer."""
 LEFT, SIDE_STRIDE = 6, 8
 """First segment of the left side, and number of segments of a side (order of `worker.body`)."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
-"""Segments of one side, counted from its first."""
+"""Segments of one side, relative to its first segment."""
 
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
 """Number of columns of `Anatomy.lengths`.
 
-Shoulder to grip, elbow to grip, hip to ankle, thigh, shank, heights of the ankle and of the
-standing pelvis, ankle ahead of the pelvis, ball ahead of and above the ankle, heel ahead of the
-ankle, upper arm [m].
+They are the lengths from shoulder to grip, elbow to grip, and hip to ankle; the lengths of thigh
+and shank; the heights of the ankle and of the standing pelvis; the positions of the ankle ahead of
+the pelvis, of the ball ahead of and above the ankle, and of the heel ahead of the ankle; and the
+length of the upper arm [m].
 """
 ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
 """Capsules on which a lying trunk rests."""
 N_ROUND = 2 * len(ROUND)
-"""Number of ends of those capsules; those of the shoulders as if they hung on the chest."""
+"""Number of ends of the capsules `ROUND`; those of the shoulders are attached to the chest."""
 
 GRIP_M = 0.08
 """Distance of the grip beyond the wrist [m]; half a hand."""
 HEEL_M = -0.045
-"""Distance of the heel's contact ahead of the ankle [m]; a quarter of a foot behind it."""
+"""Position of the heel's contact ahead of the ankle [m]; a quarter of a foot behind it."""
 FOREARM_TWIST_RAD = 0.15
-"""Outward turn about the forearm from the rest pose [rad]; a hanging palm faces the thigh."""
+"""Outward twist of the forearm from the rest pose [rad]; a hanging palm faces the thigh."""
 HAND_TWIST_RAD = 0.35
-"""Outward turn of the hand about the forearm from the rest pose [rad]."""
+"""Outward twist of the hand about the forearm from the rest pose [rad]."""
 STAND_SHARE = 0.994
-"""Height of the standing hip as a share of the leg's length: knees just unlocked."""
+"""Height of the standing hip as a share of leg length; the knees are just unlocked."""
 
 
 @dataclass(frozen=True, slots=True)
 class Anatomy:
-    """Constants of one body, or of N bodies with a first axis of N."""
+    """Constants of one body, or of N bodies along a leading axis."""
 
     offset: Floats
     """Origin (22, 3) of each segment in its parent's frame at rest [m]."""
     frame: Floats
-    """Rows bone, hinge x bone and hinge (22, 3, 3) of each limb bone at rest; else zero."""
+    """Axes (22, 3, 3) of each limb bone at rest, as rows bone, hinge x bone, hinge; else zero."""
     lengths: Floats
-    """Lengths (12,) [m]; the constants above name the columns."""
+    """Body dimensions (12,) [m]; the constants above name the columns."""
     trunk_ends: Floats
-    """Ends (12, 5) of the capsules `ROUND`: segment, position in its frame (3) [m], radius [m]."""
+    """Ends (12, 5) of the capsules `ROUND`: segment, position (3) in its frame [m], radius [m]."""
 
 
 def measure_bodies(bodies: Body) -> Anatomy:
-    """Measure N bodies, or one; arrays (N, ...), each row as `measure_body` of that body alone."""
+    """Return the constants (N, ...) of N bodies, each as `measure_body` returns them."""
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
     ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
     radii = bodies.capsule_radius_m.reshape(len(rests), -1)
@@ -68,13 +69,13 @@ def measure_bodies(bodies: Body) -> Anatomy:
 
 
 def measure_body(body: Body) -> Anatomy:
-    """Measure one body; the lengths of the right side are taken to equal those of the left side."""
+    """Return the constants of one body; its right side is assumed to be as long as its left."""
     rest = np.asarray(body.rest_position, float)
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
     frame = np.zeros((len(rest), 3, 3))
     for first in (LEFT, LEFT + SIDE_STRIDE):
-        # Elbows point backwards, knees forwards: the pole each hinge is made with.
+        # Poles of the hinges: elbows point backwards, knees forwards.
         for bone, pole in ((UPPER_ARM, -1.0), (FOREARM, -1.0), (THIGH, 1.0), (SHANK, 1.0)):
             along = rest[first + bone + 1] - rest[first + bone]
             frame[first + bone] = _make_rest_frame(along, np.array([pole, 0.0, 0.0]))
@@ -100,7 +101,7 @@ def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
 
 
 def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Return rows bone, hinge x bone and hinge of a bone with a joint bulging to `pole`."""
+    """Return the axes (bone, hinge x bone, hinge) of a bone with a joint that bulges to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)

@@ -1,7 +1,7 @@
-"""The next activity of a worker: chosen when an activity has ended, from uniform draws in [0, 1).
+"""Choice of a worker's next activity from uniform draws in [0, 1) when an activity has ended.
 
-Jobs at places follow each other (`schedule`). A worker without a free path to a place takes
-another one of its kind, or waits.
+The order of jobs at places is defined in `schedule`. A worker without a free path to a place
+chooses another place of the same kind, or waits.
 """
 
 import math
@@ -30,15 +30,15 @@ from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
 from hrc_env.worker.props import PROP_NAMES
 
 WAIT_S = (0.5, 1.1)
-"""Time from one search for a free path to the next [s]; judgement."""
+"""Interval between two searches for a free path [s]; judgement."""
 CHANGE_S = 1.5
 """Time without a free path after which another errand is chosen [s]; judgement."""
 GIVE_UP_S = 4.5
-"""Time without a free path after which the errand is given up [s]; judgement."""
+"""Time without a free path after which the errand is abandoned [s]; judgement."""
 PARKED_M = 60.0
-"""Distance along x and y at which absent workers stand [m]."""
+"""World x and y near which absent workers are parked [m]."""
 WITH_LOAD = (*st.IDLE, *st.GIVING)
-"""Activities that are possible with a load; before any other one the load is set down."""
+"""Activities that are possible with a load; the load is set down before any other activity."""
 ABOVE_M = 0.21
 """Height of working hands above a bench [m]; judgement."""
 CHEST_M = 1.2
@@ -50,8 +50,8 @@ def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> No
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
-        w: worker.
+        b: index of the environment.
+        w: index of the worker.
         draws: uniform draws (N_DRAWS,) in [0, 1).
     """
     workers, frames = state.workers[b], state.mind.clips.frames
@@ -78,15 +78,15 @@ def begin_episode(
     draws: Floats,
     activities: Sequence[int] = (),
 ) -> None:
-    """Put workers of an environment at their places, in the middle of an activity.
+    """Begin an episode of an environment: place its workers, in the middle of an activity.
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
+        b: index of the environment.
         n_present: number of workers in the episode.
-        bodies: row of the body (W,) of each worker.
+        bodies: row (W,) of each worker's body in the pool.
         draws: uniform draws (W, 2, N_DRAWS) in [0, 1) for places and first activities.
-        activities: first activities of the first workers, where there is a place for them.
+        activities: first activities of the first workers, used if there is a place for them.
     """
     mind, workers = state.mind_of(b), state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
@@ -152,7 +152,7 @@ def choose_activity(decision: Decision) -> Action:
 
 
 def _store_action(decision: Decision, action: Action) -> None:
-    """Store the action that is planned, and draw the reaction to the robot during it."""
+    """Store the planned action, and draw the worker's reaction to the robot during it."""
     people, worker = decision.mind.config.people, decision.worker
     activity = action.activity
     worker.activity, worker.duration_s = activity, action.duration_s
@@ -164,7 +164,7 @@ def _store_action(decision: Decision, action: Action) -> None:
     draw = decision.draws.item(dc.REACTION)
     pauses = draw < people.pause_probability
     backs = draw < people.pause_probability + people.step_back_probability
-    pauses |= activity == st.CLIP and backs  # a recording may go anywhere, but not backwards
+    pauses |= activity == st.CLIP and backs  # a pause replaces a step back during a clip
     worker.planned_reaction = st.PAUSE if pauses else st.BACK_AWAY if backs else st.NO_REACTION
     worker.reaction_delay_s = decision.draw(dc.DELAY, people.delay_s)
     worker.reaction_s = decision.draw(dc.REACTION_S, people.pause_s)
@@ -195,7 +195,7 @@ def _choose_errand(decision: Decision) -> None:
 
 
 def _choose_other_place(decision: Decision) -> None:
-    """Choose another use of the load that is held."""
+    """Choose another job for the load that the worker holds."""
     schedule, prop = decision.mind.schedule, PROP_NAMES[decision.worker.load_prop]
     for job, then in zip(schedule.jobs, schedule.then, strict=True):
         if job.activity == "pick up" and job.prop == prop and then:
@@ -203,7 +203,7 @@ def _choose_other_place(decision: Decision) -> None:
 
 
 def _begin_job(decision: Decision) -> Action:
-    """Begin the job where the worker is; first set down a load that is in the way."""
+    """Begin the job at the worker's location, or first set down a load that prevents it."""
     activity = st.ACTIVITY_NAMES.index(decision.job.activity)
     if not decision.kind_here:
         activity = st.LOOK_ROUND
@@ -216,7 +216,7 @@ def _begin_job(decision: Decision) -> Action:
 
 
 def _begin_activity(decision: Decision, activity: int) -> Action:
-    """Begin an activity where the worker is if no other is in the way, else stand a while."""
+    """Begin an activity on the spot if no other worker is in the way, else stand for a while."""
     config, worker = decision.mind.config, decision.worker
     near = decision.kind_here == "robot"
     if activity == st.STAND:
@@ -242,7 +242,7 @@ def _begin_activity(decision: Decision, activity: int) -> Action:
     if check_traffic(decision, action).time_s >= 0.0:
         cancel_plan(decision)
         if decision.kind_here:
-            decision.set_travel(UNDER_WAY)  # that is, the job comes next
+            decision.set_travel(UNDER_WAY)  # so that the job comes next
         return _begin_standing(decision.draw(dc.LASTS, WAIT_S))
     if row >= 0:
         lying.remove_load(decision.loads, row)
@@ -250,12 +250,12 @@ def _begin_activity(decision: Decision, activity: int) -> Action:
 
 
 def _begin_standing(duration_s: float) -> Action:
-    """Stand for some time [s]."""
+    """Return the action of standing for a duration [s]."""
     return Action(st.STAND, max(duration_s, 0.05))
 
 
 def _begin_waiting(decision: Decision) -> Action:
-    """Wait for a free path; choose another errand after a while, and at last set down the load."""
+    """Wait for a free path; after a while choose another errand, and finally set down the load."""
     worker = decision.worker
     if worker.travel == UNDER_WAY:
         decision.set_travel(WAITING)

@@ -1,4 +1,4 @@
-"""The closed form of every activity, and the smooth transition from one to the next."""
+"""Closed-form motion of every activity, and smooth transitions between activities."""
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
@@ -20,9 +20,9 @@ from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import walk, write_footprint
 
 BLEND_S = 0.45
-"""Time in which the difference between two activities decays [s]; about one settling step."""
+"""Time in which the difference between two activities decays [s]; about one step."""
 RATE_H_S = 1e-4
-"""Step of the difference quotient for velocities [s]; the error is 3 mm/s at 60 m/s^2."""
+"""Time step of the finite differences for velocities [s]; the error is 3 mm/s at 60 m/s^2."""
 
 
 @kernel
@@ -73,14 +73,14 @@ def evaluate(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def stop(worker: Worker) -> float:
-    """End an activity: stand where it ended, and let go of a load that was given away.
+    """End an activity: stand where it ends, and release a load that was set down or handed over.
 
-    Returns the angle by which the heading was unwound, a multiple of a full turn [rad].
+    Return the angle by which the heading was unwound, a multiple of a full turn [rad].
     """
     if worker.activity in st.GIVING or worker.activity == st.PUSH:
         worker.load_prop = 0
     count = worker.step_count if worker.undo_at == 0.0 else 0
-    if worker.activity == st.FALL:  # the feet on which they got up
+    if worker.activity == st.FALL:  # the footprints on which the worker got up
         count += 2
     for k in range(max(count - 2, 0), count):
         side = (k + worker.step_first) % 2
@@ -99,7 +99,7 @@ def stop(worker: Worker) -> float:
 
 @kernel
 def leave(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
-    """End an activity at its time t, and store the control vector then and a moment later.
+    """End an activity at time t, and store the control vectors at t and a short time later.
 
     Args:
         t: time since the activity began [s].
@@ -119,7 +119,7 @@ def leave(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def join(clock_s: float, frames: Floats, worker: Worker) -> None:
-    """Let an activity that begins now take over smoothly from the vectors that `leave` stored."""
+    """Blend an activity that begins now with the control vectors that `leave` stored."""
     worker.blend[:] = 0.0
     for i in range(2):
         evaluate(i * RATE_H_S, clock_s + i * RATE_H_S, frames, worker)
@@ -132,7 +132,7 @@ def join(clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def place_standing(x: float, y: float, yaw: float, worker: Worker) -> None:
-    """Let a worker stand somewhere with the feet side by side, before any activity.
+    """Place a worker standing with the feet side by side, before any activity.
 
     Args:
         x: world x of the root [m].

@@ -1,4 +1,4 @@
-"""A clip: recorded motion as control vectors, in a file of its own that any worker plays."""
+"""Clips: recorded motion as control vectors, stored in files that any worker can play."""
 
 import io
 import zipfile
@@ -15,13 +15,13 @@ from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_
 from hrc_env.motion.curves import pivot_foot
 
 VERSION = 1
-"""Version of the file, raised when its columns or fields change."""
+"""Version of the file format; it increases when columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
-"""Columns (32,) of the control vector that a recording fills: the blended ones, and both feet."""
+"""Columns (32,) of the control vector that a recording fills: the blended ones and the feet."""
 SLOWEST_HZ = 5.0
-"""Least plausible frame rate [Hz]; judgement."""
+"""Lowest plausible frame rate [Hz]; judgement."""
 FASTEST_HZ = 1000.0
-"""Greatest plausible frame rate [Hz]; judgement."""
+"""Highest plausible frame rate [Hz]; judgement."""
 FARTHEST_M = 200.0
 """Greatest plausible distance of the root from the origin [m]; judgement."""
 FASTEST_M_S = 15.0
@@ -30,21 +30,21 @@ FASTEST_M_S = 15.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Motion of a worker with the lengths `size`, which begins at the origin, towards +x."""
+    """Recorded motion of a worker; it begins at the origin, with the worker facing +x."""
 
     controls: Floats
     """Control vectors (T, N_CONTROLS), see `controls`; columns outside of `RECORDED` are zero."""
     fps: float
     """Frame rate [Hz]."""
     contacts: Bools
-    """Whether the left and the right foot stand (T, 2)."""
+    """Mask (T, 2) of whether the left and the right foot stand on the floor."""
     size: Floats
-    """Lengths (N_SIZES,) of the worker that it was made for [m], see `Anatomy.lengths`."""
+    """Body dimensions (N_SIZES,) of the worker for this motion [m], see `Anatomy.lengths`."""
     source: str
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        """Refuse shapes, numbers and speeds that no recording of a person has."""
+        """Check shapes, and that values are finite and speeds plausible for a person."""
         q, source = self.controls, self.source
         check_rate(self.fps, source)
         if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
@@ -72,7 +72,7 @@ class Clip:
 
 
 def move_to_origin(controls: Floats) -> Floats:
-    """Return control vectors that begin with the root at the origin, towards +x."""
+    """Return control vectors moved so that the root begins at the origin, facing +x."""
     out = controls.copy()
     x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -85,9 +85,9 @@ def move_to_origin(controls: Floats) -> Floats:
 
 
 def scale_clip(clip: Clip, size: Floats) -> Floats:
-    """Return control vectors (T, N_CONTROLS) for a worker with other lengths (N_SIZES,) [m].
+    """Return the control vectors (T, N_CONTROLS) for a worker of dimensions (N_SIZES,) [m].
 
-    Paths scale with the legs, the reach of the hands with the arms.
+    Paths scale with the length of the legs, the reach of the hands with that of the arms.
     """
     out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
     out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
@@ -100,7 +100,7 @@ def scale_clip(clip: Clip, size: Floats) -> Floats:
 
 
 def save_clip(clip: Clip, path: Path) -> None:
-    """Write a clip to an .npz file, completely or not at all."""
+    """Write a clip to an .npz file atomically."""
     arrays = {item.name: getattr(clip, item.name) for item in fields(clip)}
     arrays["controls"] = clip.controls[:, RECORDED]
     file = io.BytesIO()
@@ -112,7 +112,7 @@ def load_clip(path: Path) -> Clip:
     """Read a clip from a file that `save_clip` or `import-motion` wrote.
 
     Raises:
-        ConfigError: the file is no clip, damaged or of another version.
+        ConfigError: the file is not a clip, is damaged, or has another version.
     """
     names = {item.name for item in fields(Clip)}
     try:
@@ -140,7 +140,7 @@ def load_clip(path: Path) -> Clip:
 
 
 def check_rate(fps: float, source: str) -> None:
-    """Refuse a frame rate [Hz] outside of the plausible range."""
+    """Raise `ConfigError` if a frame rate [Hz] is outside of the plausible range."""
     if not SLOWEST_HZ <= fps <= FASTEST_HZ:
         raise ConfigError(
             f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
@@ -149,23 +149,23 @@ def check_rate(fps: float, source: str) -> None:
 
 
 def find_footprints(feet: Floats, size: Floats) -> Floats:
-    """Return ankle (3) and heading (T, 4) that feet would have if they were flat.
+    """Return the ankle position and heading (T, 4) that a foot would have if it were flat.
 
     Args:
-        feet: ankle (3) [m], heading and pitch [rad] of a foot (T, 5 or more).
-        size: lengths (N_SIZES,) of the body [m].
+        feet: ankle position (3) [m], heading and pitch [rad] of a foot, (T, 5 or more).
+        size: dimensions (N_SIZES,) of the body [m].
     """
     flat = feet[:, :3] - shift_by_roll(feet[:, 3], feet[:, 4], size)
     return np.concatenate([flat, feet[:, 3:4]], axis=1)
 
 
 def shift_by_roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
-    """Return the displacement (T, 3) of an ankle by the pitch of its foot [m].
+    """Return the displacement (T, 3) of an ankle due to the pitch of its foot [m].
 
     Args:
         yaw: heading of the foot (T,) [rad].
         pitch: pitch about the ball if positive, else about the heel (T,) [rad].
-        size: lengths (N_SIZES,) of the body [m].
+        size: dimensions (N_SIZES,) of the body [m].
     """
     ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])
     ahead, above = np.array([pivot_foot(p, *(ball if p > 0.0 else heel)) for p in pitch.tolist()]).T

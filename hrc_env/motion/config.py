@@ -1,4 +1,4 @@
-"""Settings of the workers' behaviour, and presets for how people are with the robot."""
+"""Settings of the workers' motion, and presets for how they behave near the robot."""
 
 from dataclasses import asdict, dataclass, field, fields
 from typing import NamedTuple
@@ -18,50 +18,49 @@ Range = tuple[float, float]
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
-    """How attentive, brisk and careful workers are; defaults without a source are judgement."""
+    """Attention, pace and care of workers; defaults without a source are judgement."""
 
     notice_m: float = 0.40
-    """Distance from trunk, head or a hand within which workers notice a part of the arm [m]."""
+    """Distance from chest, head or a hand within which workers notice the robot's arm [m]."""
     fast_m_s: float = 0.6
-    """Approach speed of the arm above which `notice_m` counts twice [m/s].
-    """
+    """Approach speed of the arm above which workers notice it within twice `notice_m` [m/s]."""
     delay_s: Range = (0.4, 0.8)
-    """Time from noticing to reacting [s]; longer than the reaction to an expected signal."""
+    """Delay from noticing the arm to reacting [s]; longer than for an expected signal."""
     pause_probability: float = 0.4
-    """Probability that a worker pauses: hands stay where they are, walkers come to a stand."""
+    """Probability that a worker reacts with a pause: the hands stop, or a walker halts."""
     step_back_probability: float = 0.15
-    """Probability that a worker withdraws the hands and steps back."""
+    """Probability that a worker reacts by withdrawing the hands and stepping back."""
     pause_s: Range = (0.6, 1.6)
     """Duration of a pause [s]."""
     calm_s: float = 4.0
-    """Time after a reaction in which nothing startles the worker [s]."""
+    """Time after a reaction during which the worker does not react again [s]."""
     detour_m: float = 0.55
-    """Distance of paths from the robot's tool and elbow [m]; 0 to ignore them."""
+    """Distance that walkers keep from the robot's tool and elbow [m]; 0 to ignore the robot."""
     speed_m_s: Range = (0.8, 1.4)
-    """Walking speed of a worker, drawn once an episode [m/s]; adults indoors."""
+    """Walking speed of a worker, drawn once per episode [m/s]; typical of adults indoors."""
     tempo: float = 1.0
-    """Factor of the pauses between two tasks and of the stays at one place."""
+    """Scale of the pauses between tasks and of the stays at a workplace; below 1 is faster."""
     sudden_probability: float = 0.05
-    """Probability that a reach is sudden; the approach speeds of ISO 13855 are for such reaches."""
+    """Probability that a reach is sudden; the approach speeds of ISO 13855 assume such reaches."""
     lunge_probability: float = 0.01
-    """Probability that a reach to the robot is a lunge with a step, in half a second."""
+    """Probability that a reach to the robot is a lunge: a step and a reach in half a second."""
     stumble_probability: float = 0.01
-    """Probability that a walker's foot catches on something."""
+    """Probability that a worker stumbles during a walk."""
     fall_probability: float = 0.0
-    """Probability that a walker with empty hands stumbles and falls, where there is room ahead."""
+    """Probability that a walker with empty hands stumbles and falls, if there is room ahead."""
     lie_s: Range = (1.5, 5.0)
-    """Time that a fallen worker lies on the floor before getting up [s]."""
+    """Time for which a fallen worker lies on the floor before getting up [s]."""
     stay_down_probability: float = 0.15
-    """Probability that a fallen worker lies on the floor for 15 to 40 s instead."""
+    """Probability that a fallen worker lies on the floor for 15 to 40 s instead of `lie_s`."""
     run_probability: float = 0.0
-    """Probability that a worker with empty hands runs to a place, where the path is long enough."""
+    """Probability that a worker with empty hands runs to a place, if the path is long enough."""
     run_m_s: Range = (2.5, 3.5)
     """Speed of a run [m/s]; a path of 2.4 m allows 2.5 m/s, one of 4.4 m allows 3.5 m/s."""
     careless_probability: float = 0.01
-    """Probability that a worker takes a few steps back between two tasks without looking."""
+    """Probability that a worker steps back without looking between two tasks."""
 
     def __post_init__(self) -> None:
-        """Refuse ranges and probabilities that are out of bounds."""
+        """Check that ranges and probabilities are within their bounds."""
         _check_ranges(self)
         for name, value in asdict(self).items():
             if np.min(value) < 0.0:
@@ -77,7 +76,7 @@ class PeopleConfig:
 
 
 def _check_ranges(config: "PeopleConfig | MotionConfig") -> None:
-    """Refuse ranges that are not (low, high), and probabilities outside of [0, 1]."""
+    """Raise `ConfigError` if a range is not (low, high) or a probability is not in [0, 1]."""
     for name in (item.name for item in fields(config)):
         value = getattr(config, name)
         if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
@@ -121,69 +120,69 @@ PEOPLE: dict[str, PeopleConfig] = {
         run_probability=0.6,
     ),
 }
-"""Kinds of people by name.
+"""Presets of people by name.
 
-"attentive" workers look out for the robot, "hurried" ones have little time to, "unaware" ones do
-not know that it moves; "headlong" workers look out for it, but run and fall.
+"attentive" workers watch the robot, "hurried" ones react to it less often, and "unaware" ones
+ignore it; "headlong" workers watch the robot, but run and fall.
 """
 
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Activities of workers and their speed; ranges are drawn from uniformly.
+    """Activities of workers and their speeds; values are drawn uniformly from ranges.
 
     Defaults marked "judgement" have no source.
     """
 
     near_probability: float = 0.85
-    """Probability that the next errand is at the robot; judgement, so that the two often meet."""
+    """Probability that the next errand is at the robot; judgement, for frequent encounters."""
     near_radius_m: Range = (1.0, 1.35)
-    """Distance from the base axis when working with the robot [m]: its targets are within reach."""
+    """Distance of workers at the robot from its base axis [m]; its targets are within reach."""
     near_azimuth_rad: float = 0.785
-    """Greatest angle from the robot's front when working with the robot [rad]; judgement."""
+    """Greatest angle, at the robot's base axis, between its front and workers [rad]; judgement."""
     dwell_s: Range = (6.0, 16.0)
-    """Time at one place before another errand [s]; judgement."""
+    """Duration of a stay at one workplace before the next errand [s]; judgement."""
     spacing_m: float = 1.1
-    """Least distance of a chosen place from another worker's place [m]; judgement."""
+    """Least distance between the places of two workers [m]; judgement."""
     near_pause_s: Range = (0.5, 2.0)
     """Duration of a pause at the robot [s]; judgement."""
     away_pause_s: Range = (1.0, 4.0)
     """Duration of a pause elsewhere [s]; judgement."""
 
     target_radius_m: Range = (0.45, 0.9)
-    """Distance of a hand's target from the base axis [m]: inside the robot's workspace."""
+    """Distance of a hand's target from the base axis [m], inside the robot's workspace."""
     target_z_m: Range = (0.85, 1.4)
-    """Height of a hand's target [m]: bench to shoulder."""
+    """Height of a hand's target [m], from bench to shoulder."""
     target_spread_rad: float = 0.45
-    """Greatest angle between target and worker seen from the base axis [rad]; judgement."""
+    """Greatest angle between target and worker about the base axis [rad]; judgement."""
     hand_speed_m_s: Range = (0.5, 1.5)
-    """Peak speed of a reaching hand [m/s]; calm manual work."""
+    """Peak speed of a reaching hand [m/s]; typical of calm manual work."""
     sudden_speed_m_s: float = 2.5
     """Peak speed of a sudden reach [m/s]; judgement, near the fastest arm movements at work."""
     two_hands_probability: float = 0.3
-    """Probability that both hands reach; judgement."""
+    """Probability that a reach uses both hands; judgement."""
     hold_s: Range = (0.2, 1.4)
-    """Time that the hands work at the target [s]; judgement."""
+    """Time for which the hands work at the target [s]; judgement."""
     lift_s: Range = (1.0, 1.4)
-    """Time to bend down to a load, and again to raise it [s]; about 1.3 m/s at the wrists."""
+    """Time to bend down to a load, and time to raise it [s]; the wrists reach about 1.3 m/s."""
     load_z_m: Range = (0.15, 0.45)
-    """Height of the grips on a load on the floor or a low box [m]; judgement."""
+    """Height of the grips of a load that stands on the floor or a low box [m]; judgement."""
 
     people: PeopleConfig = field(default_factory=PeopleConfig)
-    """How attentive, brisk and careful the workers are; the environment takes `people` by name."""
+    """Attention, pace and care of the workers; settings also accept the name of a preset."""
     jobs: tuple[Job, ...] = JOBS
-    """Jobs of the workers and their order; a name stands for a choice of jobs.
+    """Jobs of the workers and their order; settings also accept the name of a preset.
 
-    "framing" is this default; with "low_work" some jobs are at the robot's foot: kneeling, on the
-    haunches, bent (docs/workers_and_scenes.md).
+    "framing" is the default; "low_work" adds jobs near the robot's foot that are done kneeling,
+    squatting or bent over (docs/workers_and_scenes.md).
     """
     motions: tuple[str | Clip, ...] = ()
-    """Clips that workers play, or paths of their files (docs/motion_capture.md)."""
+    """Clips that workers play, or paths of clip files (docs/motion_capture.md)."""
     motions_probability: float = 0.5
-    """Probability that a worker with empty hands plays a clip next, where there is room for it."""
+    """Probability that a worker with empty hands plays a clip next, if there is room for it."""
 
     def __post_init__(self) -> None:
-        """Refuse ranges, probabilities, jobs and clips that are out of bounds."""
+        """Check ranges, probabilities, jobs and clips."""
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
@@ -196,34 +195,34 @@ class MotionConfig:
 
 
 class HandParams(NamedTuple):
-    """Settings of reaches and lifts for kernels; ranges are (low, high)."""
+    """Settings of reaches and lifts for compiled kernels; ranges are (low, high)."""
 
     target_radius_m: Range
     """Distance of a hand's target from the base axis [m]."""
     target_z_m: Range
     """Height of a hand's target [m]."""
     target_spread_rad: float
-    """Greatest angle between target and worker seen from the base axis [rad]."""
+    """Greatest angle between target and worker about the base axis [rad]."""
     hand_speed_m_s: Range
     """Peak speed of a reaching hand [m/s]."""
     sudden_speed_m_s: float
     """Peak speed of a sudden reach [m/s]."""
     two_hands_probability: float
-    """Probability that both hands reach."""
+    """Probability that a reach uses both hands."""
     hold_s: Range
-    """Time that the hands work at the target [s]."""
+    """Time for which the hands work at the target [s]."""
     lift_s: Range
-    """Time to bend down to a load, and again to raise it [s]."""
+    """Time to bend down to a load, and time to raise it [s]."""
     load_z_m: Range
-    """Height of the grips on a load on the floor or a low box [m]."""
+    """Height of the grips of a load that stands on the floor or a low box [m]."""
     robot_xy_m: Point
-    """The robot's axis on the floor."""
+    """Position of the robot's base axis on the floor [m]."""
     sudden_probability: float
     """Probability that a reach is sudden."""
 
 
 def make_hand_params(config: MotionConfig, robot_xy_m: Point) -> HandParams:
-    """Return the settings of reaches and lifts for kernels."""
+    """Return the settings of reaches and lifts for compiled kernels."""
     return HandParams(
         target_radius_m=_to_floats(config.target_radius_m),
         target_z_m=_to_floats(config.target_z_m),
@@ -240,5 +239,5 @@ def make_hand_params(config: MotionConfig, robot_xy_m: Point) -> HandParams:
 
 
 def _to_floats(limits: Range) -> Range:
-    """Return (low, high) as floats, which kernels are compiled for."""
+    """Return (low, high) as floats, the types for which kernels are compiled."""
     return float(limits[0]), float(limits[1])

@@ -1,37 +1,37 @@
-"""Columns of the control vector, with which an activity describes one moment before any anatomy.
+"""Columns of the control vector, with which activities describe a pose of any body.
 
-Angles are in radians, lengths in metres, both in the world frame unless stated otherwise. Relaxed
-arms are given relative to their shoulder, in a level frame that turns with the chest; grasping arms
-are given in the world, with the share by which they follow their target.
+Angles are in radians and lengths in metres, in the world frame unless stated otherwise. Relaxed
+arms are defined relative to the shoulder, in a level frame that turns with the chest. Grasping arms
+are defined by a target in the world and a share between 0 (relaxed) and 1 (at the target).
 """
 
 ROOT_X, ROOT_Y, HEADING = 0, 1, 2
-"""Position of the root on the floor [m] and heading [rad], the frame of other columns."""
+"""Position of the root on the floor [m] and heading [rad]."""
 PELVIS_Z = 3
-"""Wanted height of the pelvis [m]; legs that are too short lower it."""
+"""Desired height of the pelvis [m]; it is lower if the legs do not reach that far."""
 PELVIS_PITCH, PELVIS_ROLL, PELVIS_YAW = 4, 5, 6
-"""Tilt of the pelvis forward and to the right, and its turn from the heading [rad]."""
+"""Tilt of the pelvis forward and to the right, and its yaw relative to the heading [rad]."""
 SPINE_FLEX, SPINE_SIDE, SPINE_TWIST = 7, 8, 9
-"""Flexion, side bend and twist of the spine [rad], summed over abdomen, torso and chest."""
+"""Flexion, lateral bend and twist of the spine [rad], summed over abdomen, torso and chest."""
 HEAD_PITCH, HEAD_YAW = 10, 11
-"""Turn of the head from the chest, shared by neck and head [rad]; down and left are positive."""
+"""Pitch and yaw of the head relative to the chest [rad]; down and left are positive."""
 SWIVEL = 12
-"""Outward turn of the left elbow from hanging [rad]; the next column is the right elbow's."""
+"""Outward swivel of the left elbow from hanging [rad]; the right elbow's column follows."""
 HAND_OFFSET = 14
-"""Grip of the left hand from its shoulder: ahead, left, up [m]; the right hand's follows."""
+"""Grip of the left hand from its shoulder: ahead, left, up [m]; the right hand's columns follow."""
 N_BLENDED = 20
-"""Number of columns that are blended when one activity follows another, the first ones."""
+"""Number of leading columns that are blended when one activity follows another."""
 HAND_TARGET = 20
-"""Target of the left hand's grip in the world, x, y, z [m]; the right hand's follows."""
+"""Target of the left hand's grip in the world: x, y, z [m]; the right hand's columns follow."""
 HAND_SHARE = 26
-"""Share by which the left hand follows its target; the next column is the right hand's."""
+"""Share by which the left hand follows its target; the right hand's column follows."""
 ANKLE = 28
 """Left ankle: x, y, z [m], heading of the foot, pitch of the foot, pitch of the toes [rad].
 
-The heel up is positive; the right ankle's six columns follow.
+A pitch with the heel up is positive; the right ankle's six columns follow.
 """
 PROP = 40
-"""Prop that is held, an index into `props.PROPS`; 0 for nothing."""
+"""Prop that is held, an index into `props.PROPS`; 0 for none."""
 PROP_POSE = 41
 """Pose of the prop: origin x, y, z [m], yaw, pitch, roll [rad]."""
 N_CONTROLS = 47

@@ -1,4 +1,4 @@
-"""Smooth curves and points on the floor, of which every activity is made.
+"""Smooth curves and planar geometry for the activities.
 
 These kernels are never compiled with `fastmath`.
 """
@@ -12,7 +12,7 @@ from hrc_env.motion.points import Point, SagittalShift
 
 @kernel
 def min_jerk(u: float) -> float:
-    """Return a rise from 0 to 1 over u in [0, 1], at rest at both ends.
+    """Return a minimum-jerk rise from 0 to 1 over u in [0, 1], at rest at both ends.
 
     The peak rate is 1.875 (Flash & Hogan 1985).
     """
@@ -32,7 +32,7 @@ def ramp(u: float) -> float:
 
 @kernel
 def cruise(u: float, share: float) -> float:
-    """Return a rise from 0 to 1 over u in [0, 1] at constant speed.
+    """Return a rise from 0 to 1 over u in [0, 1] at constant speed between smooth ramps.
 
     Args:
         u: time as a share of the duration.
@@ -46,7 +46,7 @@ def cruise(u: float, share: float) -> float:
 
 @kernel
 def hump(u: float) -> float:
-    """Return 0 outside of [0, 1] and 1 in its middle, flat to second order at the ends."""
+    """Return a bump: 0 outside of [0, 1], 1 in the middle, flat to second order at the ends."""
     u = min(max(u, 0.0), 1.0)
     v = 4.0 * u * (1.0 - u)
     return v * v * v
@@ -54,12 +54,12 @@ def hump(u: float) -> float:
 
 @kernel
 def soft_min(a: float, b: float, width: float) -> float:
-    """Return the smaller number, rounded off downwards where both are close.
+    """Return a smooth minimum of two numbers, slightly below both if they are close.
 
     Args:
-        a: one number.
-        b: the other number.
-        width: difference below which the result is rounded off.
+        a: first number.
+        b: second number.
+        width: difference below which the result is smoothed.
     """
     closeness = max(1.0 - abs(a - b) / width, 0.0)
     return min(a, b) - width * closeness * closeness * closeness / 6.0
@@ -67,7 +67,7 @@ def soft_min(a: float, b: float, width: float) -> float:
 
 @kernel
 def saturate(d: float, knee: float, limit: float) -> float:
-    """Return `d` up to `knee`, then bend smoothly so that the result never passes `limit`."""
+    """Return `d` up to `knee`, and a value that approaches `limit` smoothly beyond it."""
     if d <= knee:
         return d
     span = limit - knee
@@ -95,7 +95,7 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 
 @kernel
 def wrap(angle: float) -> float:
-    """Return the same direction in (-pi, pi]."""
+    """Return the angle wrapped to (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
@@ -120,7 +120,7 @@ def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
 
     Args:
         q: array that holds the point [m].
-        at: index of its x.
+        at: index of the point's x.
         yaw: heading [rad].
         ahead: displacement along the heading [m].
         left: displacement to the left of the heading [m].
@@ -133,7 +133,7 @@ def pivot_foot(pitch: float, pivot_x: float, pivot_z: float) -> SagittalShift:
     """Return the displacement of the ankle when the foot pitches about a pivot.
 
     Args:
-        pitch: pitch of the foot, the heel up [rad].
+        pitch: pitch of the foot, positive with the heel up [rad].
         pivot_x: distance of the pivot ahead of the ankle [m].
         pivot_z: height of the pivot relative to the ankle [m].
     """

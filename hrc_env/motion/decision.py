@@ -1,4 +1,4 @@
-"""Inputs of the workers' decisions: constants, state and draws; and where workers may go."""
+"""Inputs of the workers' decisions: constants, state, random draws and available places."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -24,13 +24,13 @@ from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
-"""Draw of each decision; the first `N_START` are those of the activity."""
+"""Index of the draw for each decision; the first `N_START` draws belong to the activity."""
 PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
-"""First draw for places, three for each of five, and the number of draws of one decision."""
+"""First draw for places, with three for each of five places; number of draws of a decision."""
 N_STAGES = 4
-"""Number of places that are tried from which a clip has room."""
+"""Number of places with room for a clip that are tried."""
 ANY_ACTIVITY = -1
-"""Stands for whichever activity is drawn."""
+"""Value for a first activity that is drawn at random."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 
@@ -42,35 +42,35 @@ class BehaviourParams:
     config: MotionConfig
     """Settings of the workers' motion."""
     hand_params: HandParams
-    """Those of the settings that kernels read."""
+    """Settings of the hands' motion, as compiled kernels take them."""
     plan: Floorplan
-    """The floor."""
+    """Floor of the scene."""
     schedule: Schedule
-    """The jobs that there are places for."""
+    """Jobs for which the scene has places."""
     clips: Clips
     """Pieces of recorded motion."""
     anatomy: Anatomy
-    """Measures (N, ...) of the pool of bodies."""
+    """Measurements (N, ...) of the pool of bodies."""
     loads: Records1[Load]
-    """Loads (L,) that lie about when an episode begins."""
+    """Loads (L,) at rest in the scene when an episode begins."""
     fewest: int
     """Least number of workers in an episode."""
     robot_girth_m: float = 0.0
-    """Reach of a driving robot around the points of it that people watch [m]; 0 for an arm."""
+    """Radius of a mobile robot around the points of it that people watch [m]; 0 for an arm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cast:
-    """The workers of one episode and their first activities, as far as these are not drawn."""
+    """Prescribed workers and first activities of one episode; the rest is drawn at random."""
 
     n_workers: int | None = None
-    """Number of workers; None to draw it."""
+    """Number of workers; None for a random number."""
     bodies: tuple[int, ...] | None = None
-    """Row of the body of each of the first workers; None to draw them."""
+    """Row of the body of each of the first workers; None for random bodies."""
     activities: tuple[int, ...] | None = None
-    """First activity of the first workers: indices into `ACTIVITY_NAMES` or `ANY_ACTIVITY`."""
+    """First activities of the first workers: indices into `ACTIVITY_NAMES` or `ANY_ACTIVITY`."""
     mind: BehaviourParams | None = None
-    """Behaviour in this episode; None for that of all episodes."""
+    """Behaviour in this episode; None for the environment's usual behaviour."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +80,14 @@ class MotionState:
     workers: Records2[Worker]
     """Record of each worker (B, W)."""
     loads: Records2[Load]
-    """Loads (B, L) that lie about."""
+    """Loads (B, L) at rest in the scene."""
     mind: BehaviourParams
     """Constants of the behaviour."""
     minds: dict[int, BehaviourParams] = field(default_factory=dict)
-    """Constants of the environments that have their own in this episode."""
+    """Constants for this episode of environments with a custom behaviour, by environment."""
 
     def mind_of(self, b: int) -> BehaviourParams:
-        """Return the constants of environment b's episode."""
+        """Return the constants of the current episode of environment b."""
         return self.minds.get(b, self.mind)
 
 
@@ -100,17 +100,17 @@ class Decision:
     workers: Records1[Worker]
     """Records (W,) of the workers of the environment."""
     w: int
-    """Row of the deciding worker."""
+    """Index of the deciding worker."""
     draws: Floats
     """Uniform draws (N_DRAWS,) in [0, 1)."""
     clock_s: float
     """Time since the episode began [s]."""
     loads: Records1[Load]
-    """Loads (L,) that lie about in the environment."""
+    """Loads (L,) at rest in the environment."""
     held_prop: int = 0
-    """Prop that the worker holds when deciding, an index into `PROPS`."""
+    """Prop that the worker holds at the decision, an index into `PROPS`."""
     first_activity: int | None = None
-    """Activity that the worker has to begin the episode with; None for any."""
+    """Activity with which the worker must begin the episode; None for any."""
 
     @property
     def worker(self) -> Worker:
@@ -125,7 +125,7 @@ class Decision:
 
     @property
     def kind_here(self) -> str:
-        """Kind of the place where the worker has something to do; empty if there is none."""
+        """Kind of the worker's workplace; an empty string if there is none."""
         at = self.worker.place_kind
         return "" if at in (NOWHERE, ON_STAGE) else WORKPLACE_KINDS[at]
 
@@ -144,16 +144,16 @@ class Decision:
         return limits[0] + self.draws.item(index) * (limits[1] - limits[0])
 
     def find_others(self) -> Bools:
-        """Return which other workers (W,) are present."""
+        """Return a mask (W,) of the other workers that are present."""
         others = self.workers["is_present"].copy()
         others[self.w] = False
         return others
 
 
 def list_obstacles(decision: Decision) -> Floats:
-    """Return discs (n, 3) that a path goes around: x, y, radius [m].
+    """Return discs (n, 3) that a path must avoid: x, y, radius [m].
 
-    They are where other workers will stand and work, the robot's arm, and loads that lie about.
+    They cover other workers at the ends of their activities, the robot's arm, and loads.
     """
     people, rows = decision.mind.config.people, []
     others = decision.workers[decision.find_others()]
@@ -171,24 +171,24 @@ def list_obstacles(decision: Decision) -> Floats:
 
 
 def list_places(decision: Decision) -> Iterator[Place]:
-    """Yield places for the job that no other worker has, the one last chosen first."""
+    """Yield free places for the job, beginning with the place that was chosen last."""
     if decision.worker.travel == UNDER_WAY:
         yield Place(*decision.worker.place.tolist())
     yield from _list_free_places(decision, decision.job)
 
 
 def list_stages(decision: Decision, starts: Floats) -> Iterator[Place]:
-    """Yield the nearest few of the poses (k, 3) for a clip that no other worker is near."""
+    """Yield the `N_STAGES` nearest poses of (k, 3) for a clip, except those near another worker."""
     away = np.hypot(*(starts[:, :2] - decision.worker.place[:2]).T)
     nearest = starts[np.argsort(away, kind="stable")[:N_STAGES]].tolist()
     return _keep_free(decision, (Place(x, y, yaw, 0.0) for x, y, yaw in nearest))
 
 
 def _list_free_places(decision: Decision, job: Job) -> Iterator[Place]:
-    """Yield places for a job that no other worker is near.
+    """Yield places for a job, except those near another worker.
 
-    For a load that is taken up they are where it lies, for something that is pushed where nothing
-    lies.
+    A job that needs a load is done where such a load rests. A prop is pushed to a place without
+    loads.
     """
     if job.prop != PROP_NAMES[0] and job.by == "walk" and job.at != HERE:
         kind = PROP_NAMES.index(job.prop)
@@ -200,7 +200,7 @@ def _list_free_places(decision: Decision, job: Job) -> Iterator[Place]:
 
 
 def _keep_free(decision: Decision, places: Iterable[Place]) -> Iterator[Place]:
-    """Yield those of some places that no other worker is near."""
+    """Yield places except those near another worker."""
     apart_m = decision.mind.config.spacing_m
     taken = decision.workers["place"][decision.find_others(), :2].tolist()
     for place in places:
@@ -209,7 +209,7 @@ def _keep_free(decision: Decision, places: Iterable[Place]) -> Iterator[Place]:
 
 
 def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
-    """Yield places of a kind: drawn around the robot, the scene's, or where the worker is."""
+    """Yield places of a kind: drawn around the robot, given by the scene, or the current one."""
     draws, config, plan = decision.draws[PLACES:].tolist(), decision.mind.config, decision.mind.plan
     if kind == HERE:
         yield Place(*decision.worker.place.tolist())
@@ -230,7 +230,7 @@ def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
 
 
 def take_first_place(decision: Decision) -> None:
-    """Choose place and job of the beginning; if all are taken, the most remote spot."""
+    """Choose a worker's first place and job; if all are taken, choose the most remote location."""
     mind, worker, draw = decision.mind, decision.worker, decision.draws.item(NEXT)
     begins = [k for k, _ in mind.schedule.begins]
     near = draw < mind.config.near_probability or not begins
@@ -253,7 +253,7 @@ def take_first_place(decision: Decision) -> None:
 def group_jobs(schedule: Schedule) -> dict[str, list[int]]:
     """Return the jobs with which an episode can begin on request, by activity.
 
-    These jobs need empty hands and a place, and wait for no signal.
+    These jobs need empty hands and a place, and do not wait for a signal.
     """
     jobs: dict[str, list[int]] = {}
     for k, job in enumerate(schedule.jobs):
@@ -279,7 +279,7 @@ def _list_jobs(decision: Decision, activity: int, near: bool) -> tuple[int, ...]
 
 
 def _find_loneliest(decision: Decision) -> Place:
-    """Return the walkable spot that is farthest from the other workers."""
+    """Return the walkable location that is farthest from the other workers."""
     grid = decision.mind.plan.grid
     x, y = (np.argwhere(grid.slack >= 0.0) * CELL_M + grid.origin).T
     others = decision.workers["place"][decision.find_others(), :2]

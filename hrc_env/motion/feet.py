@@ -1,7 +1,7 @@
-"""Feet: fixed to their footprint while loaded, rolling from heel to ball, swinging in between.
+"""Motion of the feet: fixed to footprints in stance, rolling from heel to ball, then swinging.
 
-Step k is taken by foot (first + k) % 2, leaves the floor at start + k * period and lands a fixed
-swing time later. Steps that are retraced run backwards in time.
+Step k is taken by foot (first + k) % 2, which leaves the floor at start + k * period and lands a
+fixed swing time later. Steps that are retraced run backwards in time.
 """
 
 import math
@@ -23,31 +23,31 @@ FLAT_S = 0.10
 ROLL_SHARE = 0.62
 """Time from heel-off to toe-off as a share of the period of a step."""
 RAMP_SHARE = 0.29
-"""Share of a swing in which the foot gathers speed, and again loses it."""
+"""Share of a swing in which the foot accelerates, and in which it decelerates."""
 LIFT_BASE_M = 0.025
-"""Rise of the foot in any step, above the rise by its roll [m]."""
+"""Rise of the foot in any step, in addition to the rise due to its roll [m]."""
 LIFT_STRIDE_M = 0.045
 """Additional rise of the foot in a full stride [m]."""
 RUN_RAMP_SHARE = 0.36
-"""`RAMP_SHARE` of runners; judgement."""
+"""Value of `RAMP_SHARE` for runners; judgement."""
 KICK_M = 0.20
-"""Height by which the heel of a runner comes up behind [m]; judgement."""
+"""Additional rise of a runner's heel behind the body [m]; judgement."""
 KICK_PITCH = 1.3
 """Push-off pitch of a runner as a multiple of a walker's; judgement."""
 
 
 class FootPitch(NamedTuple):
-    """Pitch that steps add to a foot."""
+    """Pitch of a foot due to its steps."""
 
     heel_up: float
-    """Pitch about the ball, the heel up [rad]."""
+    """Pitch about the ball with the heel up [rad]."""
     toes_up: float
-    """Pitch about the heel, the toes up [rad]; negative or zero."""
+    """Pitch about the heel with the toes up [rad]; negative or zero."""
 
 
 @kernel
 def _pitch_foot(t: float, lift: float, land: float, period: float, stride: float) -> FootPitch:
-    """Return the pitch that one step adds: heel up about the ball, then toes up about the heel.
+    """Return the pitch due to one step: first heel up about the ball, then toes up about the heel.
 
     Args:
         t: time [s].
@@ -70,7 +70,7 @@ def _pitch_foot(t: float, lift: float, land: float, period: float, stride: float
 
 @kernel
 def to_step_time(t: float, worker: Worker) -> float:
-    """Return the time at which the steps are read, which runs backwards when they are retraced."""
+    """Return the time on the steps' clock, which runs backwards while steps are retraced."""
     undo = worker.undo_at
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
@@ -80,7 +80,7 @@ def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: 
     """Write the six ankle columns of one foot at time t into the control vector.
 
     Args:
-        t: time on the clock of the steps [s].
+        t: time on the steps' clock [s].
         side: 0 left, 1 right.
         footprints: footprints (N, 5) of the steps.
         stance: footprints (2, 5) at the beginning.
@@ -114,7 +114,7 @@ def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: 
             heel, toes = _pitch_foot(t, lift, lift + aloft, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
             step_up = footprints[k, 4] - ground
-            if step_up != 0.0:  # up early, before the foot comes over the tread; down late
+            if step_up != 0.0:  # rise early, before the foot is above the tread; descend late
                 ground += step_up * min_jerk((u if step_up > 0.0 else u - 0.4) / 0.6)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(u)
             flown = min_jerk(2.0 * u) if u < 1.0 else 0.0
@@ -139,12 +139,12 @@ def place_feet(t: float, worker: Worker) -> None:
 
 @kernel
 def raise_heel(side: int, pitch: float, worker: Worker) -> None:
-    """Pitch a standing foot about its ball, or about its heel if pitch is negative.
+    """Pitch a standing foot about its ball, or about its heel if the pitch is negative.
 
     Args:
         side: 0 left, 1 right.
-        pitch: additional pitch, the heel up [rad].
-        worker: record; its `q` is changed.
+        pitch: additional pitch, positive with the heel up [rad].
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     at = c.ANKLE + 6 * side

@@ -1,4 +1,4 @@
-"""In which scenes a clip of recorded motion has room."""
+"""Scenes that have room for a clip of recorded motion."""
 
 from collections.abc import Mapping
 
@@ -17,16 +17,16 @@ def measure_played_s(
     worker: str | tuple[str, ...] = "worker_1",
     config: MotionConfig | None = None,
 ) -> dict[str, float]:
-    """Return how much of a clip workers play, by scene [s]; 0 where it has no room.
+    """Return the duration of a clip that workers can play in each scene [s]; 0 without room.
 
     Args:
         clip: recorded motion.
         grounds: floors of scenes, by name (`scene.build.all_grounds`).
-        worker: the bodies, as `HRCConfig.worker` takes them.
+        worker: bodies of the workers, in the format of `HRCConfig.worker`.
         config: settings of the workers' motion; None for the default.
 
     Raises:
-        ConfigError: there are no two moments with both feet on the floor, so it is never played.
+        ConfigError: there are no two moments with both feet on the floor, between which to play it.
     """
     lengths, played_s = (
         measure_bodies(load_bodies(select_bodies(worker))).lengths,
@@ -42,7 +42,7 @@ def measure_played_s(
 
 
 def describe_fit(clip: Clip, played: dict[str, float]) -> str:
-    """Return a sentence or two about where a clip plays, from `measure_played_s`."""
+    """Return a text on the scenes in which a clip plays, given the result of `measure_played_s`."""
     whole_s = (len(clip.controls) - 1) / clip.fps
     plays = [f"{name} ({s:.1f} of its {whole_s:.1f} s)" for name, s in played.items() if s > 0.0]
     lacks = [name for name, s in played.items() if s == 0.0]

@@ -1,4 +1,4 @@
-"""Where a worker's root may be: the free distance, or slack, on a grid over the floor."""
+"""Free space for a worker's root: the distance to obstacles, or slack, on a floor grid."""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from hrc_env.motion.points import Point
 from hrc_env.world import Grounds
 
 BODY_M = 0.40
-"""Distance that walkers keep from objects [m]: half their width, swinging arms included."""
+"""Distance that walkers keep from objects [m]: half their width with swinging arms."""
 STAND_M = 0.22
-"""Distance that workers keep from objects at work [m]: half a trunk's depth, and its sway."""
+"""Distance that workers keep from objects at work [m]: half a trunk's depth and its sway."""
 CELL_M = 0.05
 """Size of a cell of the grid [m]."""
 
@@ -24,23 +24,23 @@ class FloorGrid(NamedTuple):
     """Slack on a grid over the floor; the arrays are read-only."""
 
     slack: Floats
-    """Distance (X, Y) to objects and the edge beyond `BODY_M` [m]; walkers fit where it is >= 0."""
+    """Distance (X, Y) to objects and edges minus `BODY_M` [m]; walkers fit where it is >= 0."""
     origin: Floats
     """World x, y (2,) of the first grid point [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floorplan:
-    """The floor of a scene as planners use it."""
+    """The floor of a scene for planning."""
 
     grid: FloorGrid
-    """Slack on a grid."""
+    """Slack on a grid over the floor."""
     grounds: Grounds
-    """The floor as the scene describes it."""
+    """Description of the floor by the scene."""
 
 
 def make_floorplan(grounds: Grounds) -> Floorplan:
-    """Measure the floor of a scene.
+    """Compute the free space on the floor of a scene.
 
     Args:
         grounds: walkable area, footprints of objects, places and the robot.
@@ -67,14 +67,14 @@ def make_floorplan(grounds: Grounds) -> Floorplan:
 
 
 def locate_beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> Point:
-    """Return the point at a distance from the robot's axis and an angle from its front."""
+    """Return the point at a distance from the robot's base axis and an angle from its front."""
     x, y = grounds.robot_xy_m
     return Point(x + radius_m * math.cos(angle_rad), y + radius_m * math.sin(angle_rad))
 
 
 def count_room(plan: Floorplan, apart_m: float) -> int:
-    """Return how many places fit a distance apart, taken in the order of the grid."""
-    coarse = 4  # grid points of the field to one that is tried
+    """Return the number of places at least a distance apart, chosen greedily in grid order."""
+    coarse = 4  # every fourth grid point is tried
     taken = np.zeros((0, 2))
     for point in np.argwhere(plan.grid.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
         if not len(taken) or np.hypot(*(taken - point).T).min() >= apart_m:
@@ -83,12 +83,12 @@ def count_room(plan: Floorplan, apart_m: float) -> int:
 
 
 def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
-    """Return the distance (X, Y) from footprints and the robot beyond half a body [m].
+    """Return the distance (X, Y) from footprints and the robot, minus half a body's width [m].
 
     Args:
         xs: world x (X, 1) of the grid points [m].
         ys: world y (Y,) of the grid points [m].
-        grounds: the floor.
+        grounds: floor of the scene.
     """
     robot_x, robot_y = grounds.robot_xy_m
     slack = np.hypot(xs - robot_x, ys - robot_y) - grounds.robot_clearance_m
@@ -103,7 +103,7 @@ def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
 
 @kernel
 def read_slack(x: float, y: float, grid: FloorGrid) -> float:
-    """Return the slack at a point, interpolated; negative outside of the walkable area [m].
+    """Interpolate the slack at a point [m]; it is negative outside of the walkable area.
 
     Args:
         x: world x [m].

@@ -1,6 +1,6 @@
-"""The simulated workers: behaviour, activities and kinematics as one batch.
+"""Batched simulation of the workers: behaviour, activities and kinematics.
 
-Every activity is a closed form in the time since it began; velocities are difference quotients.
+Every activity is a closed form of the time since it began; velocities are finite differences.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -60,18 +60,18 @@ __all__ = [
 ]
 
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
-"""Names of the values of `activity`."""
+"""Name of each activity, by the index that `activity` returns."""
 ABSENT = -1
-"""Activity of an absent worker."""
+"""Value of `activity` for an absent worker."""
 PARKED_Z_M = -100.0
-"""Height of absent workers, where no camera looks [m]."""
+"""Height of absent workers, out of sight of all cameras [m]."""
 HALT_S = 0.3
-"""Time in which moving hands halt [s]."""
+"""Time in which moving hands come to a halt [s]."""
 
 CAST_TRIES = 40
-"""Number of draws for an episode in which workers begin with given activities."""
+"""Number of attempts to draw an episode that begins with given activities."""
 NOBODY_CAST: Mapping[int, Cast] = MappingProxyType({})
-"""No casts: everything is drawn."""
+"""Default without casts: all episodes are drawn at random."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -86,11 +86,11 @@ OPEN_FLOOR = Grounds(
     robot_xy_m=FOOT_M[:2],
     robot_clearance_m=0.8,
 )
-"""Floor for workers without a scene: the laboratory's walkway without its furniture."""
+"""Floor for workers without a scene: the walkway of the laboratory, without furniture."""
 
 
 class BodyPath(NamedTuple):
-    """Positions and orientations of bodies, in the world."""
+    """Positions and orientations of bodies in the world frame."""
 
     position: Points3
     """Origins (..., 22, 3) of the segments [m]."""
@@ -99,27 +99,27 @@ class BodyPath(NamedTuple):
 
 
 class BodyRates(NamedTuple):
-    """Velocities of bodies in the world, and the props that they hold."""
+    """Velocities of bodies in the world frame, and the props that they hold."""
 
     velocity: Velocities3
     """Velocities (..., 22, 3) of the origins of the segments [m/s]."""
     angular_velocity: Floats
     """Angular velocities (..., 22, 3) of the segments [rad/s]."""
     held: Floats
-    """Held props (..., N_HELD), see `holding`."""
+    """Held props (..., N_HELD), see `holding.N_HELD`."""
 
 
 class Advance(NamedTuple):
-    """Motion over some steps."""
+    """Motion of workers over several steps."""
 
     path: WorkerPath
-    """Path of the bodies, arrays (B, T, W, 22, ...)."""
+    """Paths of the bodies, arrays (B, T, W, 22, ...)."""
     motion: WorkerMotion
     """Bodies after the last step, arrays (B, W, 22, ...)."""
 
 
 class Grip(NamedTuple):
-    """Where the used hand of each worker grips."""
+    """Grip of the hand that each worker uses."""
 
     position: Points3
     """Position (B, W, 3) of the grip in the world [m]."""
@@ -128,12 +128,12 @@ class Grip(NamedTuple):
 
 
 class MindGroup(NamedTuple):
-    """Environments with the same constants of behaviour."""
+    """Environments that share constants of behaviour."""
 
     mind: BehaviourParams
-    """The constants."""
+    """Constants of the behaviour."""
     parts: tuple[slice, ...]
-    """Slices of the environments."""
+    """Slices of the batch that contain the environments."""
 
 
 def make_state(
@@ -145,20 +145,20 @@ def make_state(
     fewest: int | None = None,
     robot_girth_m: float = 0.0,
 ) -> MotionState:
-    """Return the state of the workers of some environments; call `reset` before use.
+    """Allocate the state of the workers of a batch of environments; call `reset` before use.
 
     Args:
         batch: number of environments.
-        n_workers: number of workers in each of them.
-        body: the body of all workers, or a pool of which each worker gets one in each episode.
+        n_workers: greatest number of workers in each environment.
+        body: the body of all workers, or a pool from which each worker's body is drawn per episode.
         config: settings of the motion.
-        grounds: the floor on which they walk.
-        fewest: least number of workers in an episode, which is drawn; None for all.
-        robot_girth_m: reach of a driving robot around the points that workers watch of it [m];
+        grounds: floor of the scene.
+        fewest: least number of workers in an episode, for a random number; None for `n_workers`.
+        robot_girth_m: radius of a mobile robot around the points of it that workers watch [m];
             0 for an arm.
 
     Raises:
-        ConfigError: the floor has no room for so many workers, or for a clip.
+        ConfigError: the floor has no room for this number of workers, or for a clip.
     """
     fewest = n_workers if fewest is None else fewest
     bones, plan = measure_bodies(body), make_floorplan(grounds)
@@ -176,7 +176,7 @@ def make_state(
     mind = BehaviourParams(
         config, hand_params, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
     )
-    # Each worker may also bring or receive a load, which needs a row.
+    # One more row per worker, because each may bring or receive a load.
     rows = np.zeros((batch, len(loads) + n_workers), LOAD)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), rows, mind)
 
@@ -193,11 +193,11 @@ def reset(
         state: state of all workers, which is changed.
         ids: environments (N,).
         rngs: one generator for each of the B environments.
-        casts: by environment, what is not drawn; the same numbers are drawn with and without a
-            cast.
+        casts: prescribed parts of episodes, by environment; the random numbers are the same with
+            and without a cast.
 
     Raises:
-        ConfigError: workers find no place for an activity with which they have to begin.
+        ConfigError: there is no place for an activity with which a worker must begin.
     """
     n_workers, fewest = state.workers.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
@@ -221,15 +221,15 @@ def _begin_cast_episode(
     cast: Cast,
     rng: np.random.Generator,
 ) -> None:
-    """Begin an episode with a cast; draw again until all workers begin with their activities.
+    """Begin an episode with a cast; draw again until all workers begin with their given activities.
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
+        b: index of the environment.
         n_present: drawn number of workers.
-        bodies: drawn row of the body (W,) of each worker.
+        bodies: drawn row (W,) of each worker's body in the pool.
         draws: uniform draws (W, 2, N_DRAWS) in [0, 1).
-        cast: what is not drawn.
+        cast: prescribed parts of the episode.
         rng: generator of further draws.
     """
     n = n_present if cast.n_workers is None else cast.n_workers
@@ -255,7 +255,7 @@ def _begin_cast_episode(
 
 
 def draw_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """Return a body (W,) for each worker by draws in [0, 1), different ones if possible."""
+    """Return the body (W,) of each worker from draws in [0, 1), without repetition if possible."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -266,7 +266,7 @@ def draw_bodies(draws: Floats, n_bodies: int) -> Ints:
 def advance(
     state: MotionState, rngs: Sequence[np.random.Generator], dt_s: float, n_steps: int
 ) -> Advance:
-    """Advance all workers by some steps.
+    """Advance all workers by a number of steps.
 
     Args:
         state: state of all workers, which is changed.
@@ -275,7 +275,7 @@ def advance(
         n_steps: number of steps T.
 
     Returns:
-        The path at dt_s, 2 dt_s, ... after the last call, and the bodies at its end.
+        The paths at dt_s, 2 dt_s, ... after the last call, and the bodies at the end.
     """
     workers, frames = state.workers, state.mind.clips.frames
     batch, n_workers = workers.shape
@@ -296,13 +296,13 @@ def watch(
     dt_s: float,
     cue: WorkerSignal | None = None,
 ) -> None:
-    """Let the workers look at the robot, and follow the signal of the task.
+    """Update the workers' reactions to the robot and to the task's signal.
 
     Args:
         state: state of all workers, which is changed.
         elbow_and_tool_world: elbow and tool, or front and back, of each robot (B, 2, 3) [m].
         motion: bodies of the workers.
-        dt_s: time since the last look [s].
+        dt_s: time since the last call [s].
         cue: signal of the task; None if it has none.
     """
     if cue is not None:
@@ -322,7 +322,7 @@ def watch(
 
 
 def _group_by_mind(state: MotionState) -> Iterator[MindGroup]:
-    """Yield each set of constants with its environments."""
+    """Yield each set of constants with the environments that use it."""
     if not state.minds:
         yield MindGroup(state.mind, (slice(None),))
         return
@@ -337,7 +337,7 @@ def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
 
     Args:
         state: state of all workers.
-        motion: their bodies.
+        motion: bodies of the workers.
     """
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
@@ -350,7 +350,7 @@ def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
 
 
 def _measure_grip(workers: Records2[Worker], motion: WorkerMotion) -> Grip:
-    """Return position and velocity of the grip of the hand that each worker uses."""
+    """Return the position and velocity of the grip of the hand that each worker uses."""
     hands = (LEFT + HAND + SIDE_STRIDE * workers["side"])[..., None, None]
 
     def of_hand(values: Floats) -> Floats:
@@ -366,7 +366,7 @@ def _measure_grip(workers: Records2[Worker], motion: WorkerMotion) -> Grip:
 
 @kernel
 def _count_work(workers: Records2[Worker], n_screws: Ints, boring: Bools) -> None:
-    """Write the number of driven screws of each worker, and whether one is being driven."""
+    """Write the number of screws that each worker has driven, and whether one is being driven."""
     for b, w in np.ndindex(workers.shape):
         if workers[b, w].activity == st.SCREW:
             progress = count_screws(workers[b, w])
@@ -374,7 +374,7 @@ def _count_work(workers: Records2[Worker], n_screws: Ints, boring: Bools) -> Non
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
-    """Return the bodies now, arrays (B, W, 22, ...), or those of environments `ids` only."""
+    """Return the current bodies (B, W, 22, ...) of all environments or of environments `ids`."""
     rows = slice(None) if ids is None else np.asarray(ids, np.int64)
     return evaluate_motion(state.workers[rows], state.mind.clips.frames, state.loads[rows])
 
@@ -382,12 +382,12 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
 def evaluate_motion(
     workers: Records2[Worker], frames: Floats, loads: Records2[Load] | None = None
 ) -> WorkerMotion:
-    """Return the bodies of workers at their times.
+    """Return the bodies of workers at the current times of their activities.
 
     Args:
         workers: records (B, W).
         frames: frames of all clips.
-        loads: loads (B, L) that lie about.
+        loads: loads (B, L) at rest in the scene.
     """
     path, rates = _make_path(workers.shape), _make_rates(workers.shape)
     _evaluate_bodies(workers, frames, path, rates)
@@ -405,7 +405,7 @@ def _make_motion(
     rates: BodyRates,
     loads: Records2[Load] | None = None,
 ) -> WorkerMotion:
-    """Return bodies (B, W, ...) with the props that they hold, and loads (B, L) that lie about."""
+    """Return bodies (B, W, ...) with the props that they hold and the loads (B, L) at rest."""
     rows = rates.held
     if loads is not None:
         rows = np.concatenate([rows, loads["shown"]], axis=1)
@@ -421,12 +421,12 @@ def _make_motion(
 
 
 def _make_path(lead: tuple[int, ...]) -> BodyPath:
-    """Return empty arrays for bodies with some leading axes."""
+    """Return uninitialized arrays for bodies with given leading axes."""
     return BodyPath(np.empty((*lead, N_SEGMENTS, 3)), np.empty((*lead, N_SEGMENTS, 4)))
 
 
 def _make_rates(lead: tuple[int, ...]) -> BodyRates:
-    """Return empty arrays for bodies with some leading axes."""
+    """Return uninitialized arrays for bodies with given leading axes."""
     shape = (*lead, N_SEGMENTS, 3)
     return BodyRates(np.empty(shape), np.empty(shape), np.empty((*lead, N_HELD)))
 
@@ -447,9 +447,9 @@ def _advance_until_decision(
     Args:
         dt_s: duration of a step [s].
         n_steps: number of steps.
-        done: number (B,) of steps that are done, which is increased.
-        over: whether an activity (B, W) is over, at its end or back at its beginning; on the next
-            call these workers have decided.
+        done: number (B,) of completed steps, which is increased.
+        over: mask (B, W) of activities that are over, at their end or reversed to their beginning;
+            these workers must have decided before the next call.
         workers: records (B, W), which are changed.
         frames: frames of all clips.
         path: path of the bodies, which is written.
@@ -491,7 +491,7 @@ def _advance_until_decision(
 def _evaluate_bodies(
     workers: Records2[Worker], frames: Floats, path: BodyPath, rates: BodyRates
 ) -> None:
-    """Write the bodies now.
+    """Write the current bodies.
 
     Args:
         workers: records (B, W).
@@ -508,7 +508,7 @@ def _evaluate_bodies(
 
 @kernel
 def _tick(dt_s: float, worker: Worker) -> None:
-    """Advance the clocks of a worker by a step [s]; the pace approaches the wanted one."""
+    """Advance the clocks of a worker by a time step [s], and move the pace towards its target."""
     most = dt_s / HALT_S
     worker.pace += min(max(worker.wanted_pace - worker.pace, -most), most)
     worker.time_s += dt_s * worker.pace
@@ -517,10 +517,10 @@ def _tick(dt_s: float, worker: Worker) -> None:
 
 @kernel
 def _pose_at(later_s: float, frames: Floats, worker: Worker) -> None:
-    """Write `q`, `p` and `r` of a worker a time later than now.
+    """Write `q`, `p` and `r` of a worker at a later time.
 
     Args:
-        later_s: that time [s].
+        later_s: time from now [s].
         frames: frames of all clips.
         worker: record of the worker.
     """
@@ -530,7 +530,7 @@ def _pose_at(later_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: Worker) -> None:
-    """Write the pose now, and velocities from the pose `RATE_H_S` later.
+    """Write the current pose, and velocities from the pose `RATE_H_S` later.
 
     Args:
         frames: frames of all clips.
@@ -551,7 +551,7 @@ def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: W
 
 @kernel
 def _write_pose(position: Floats, quaternion: Floats, worker: Worker) -> None:
-    """Write a pose into arrays; absent workers are far below the floor.
+    """Write a pose into arrays; absent workers are placed far below the floor.
 
     Args:
         position: origins (22, 3), which are written [m].

@@ -1,4 +1,4 @@
-"""Reaching and lifting: hands go to targets, and the trunk follows as far as it must."""
+"""Reaching and lifting: hands move to targets, and the trunk leans as far as necessary."""
 
 import math
 from typing import NamedTuple
@@ -22,7 +22,7 @@ from hrc_env.motion.posture import (
 from hrc_env.motion.state import Worker
 
 SPARE_LEAN = 0.04
-"""Lean beyond the least that is needed, for the sway of a standing body takes as much away."""
+"""Additional lean beyond the minimum, to compensate for the sway of a standing body."""
 CARRY_FORWARD_M = 0.36
 """Distance of a lifted load ahead of the root [m]; judgement."""
 CARRY_Z_M = 1.05
@@ -32,26 +32,26 @@ LOAD_HALF_WIDTH_M = 0.20
 
 
 class LiftTimes(NamedTuple):
-    """Durations of the parts of a lift."""
+    """Durations of the phases of a lift."""
 
     bend_s: float
-    """Time to bend down, and to straighten again [s]."""
+    """Time to bend down, and time to straighten up [s]."""
     raise_s: float
-    """Time to raise the load, and to lower it [s]."""
+    """Time to raise the load, and time to lower it [s]."""
     carry_s: float
-    """Time to hold the load up [s]."""
+    """Time for which the load is held up [s]."""
 
 
 @kernel
 def _turn_head(share: float, worker: Worker) -> None:
-    """Turn the head to the work by a share."""
+    """Turn the head towards the work by a share of the full turn."""
     worker.q[c.HEAD_YAW] += share * (worker.gaze_yaw - worker.q[c.HEAD_YAW])
     worker.q[c.HEAD_PITCH] += share * worker.gaze_pitch
 
 
 @kernel
 def _extend(out: float, worker: Worker) -> None:
-    """Set hands and trunk to a share `out` of a reach."""
+    """Set hands and trunk to the fraction `out` of a reach."""
     q = worker.q
     lean(worker.lean * out, worker.squat, worker.twist * out, worker)
     for i in range(6):
@@ -62,11 +62,11 @@ def _extend(out: float, worker: Worker) -> None:
 
 @kernel
 def reach(t: float, worker: Worker) -> None:
-    """Let a standing worker reach out, work there and take the hands back.
+    """Add a reach to the pose of a standing worker: hands out, work at the target, hands back.
 
     Args:
         t: time since the reach began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q = worker.q
     there = worker.out_at + worker.out_s
@@ -87,11 +87,11 @@ def reach(t: float, worker: Worker) -> None:
 
 @kernel
 def lift(t: float, worker: Worker) -> None:
-    """Let a standing worker pick a load up, hold it and put it back.
+    """Add a lift to the pose of a standing worker: raise a load, hold it, put it back.
 
     Args:
         t: time since the lift began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q = worker.q
     grip = worker.out_at + worker.out_s
@@ -112,7 +112,7 @@ def lift(t: float, worker: Worker) -> None:
 
 @kernel
 def _find_lean(worker: Worker) -> None:
-    """Find the smallest lean that brings the targets within reach; else move the targets nearer."""
+    """Find the smallest lean that brings the targets within reach, or move the targets nearer."""
     p = worker.p
     low, high, worker.lean = 0.0, MOST_LEAN, 0.0
     for attempt in range(12):
@@ -121,7 +121,7 @@ def _find_lean(worker: Worker) -> None:
         far = measure_overreach(worker)
         if attempt == 0 and far <= 0.0:
             return
-        if far > 0.0:  # at first from `low` itself
+        if far > 0.0:  # `low` is unchanged at the first attempt
             low = worker.lean
         else:
             high = worker.lean
@@ -149,16 +149,16 @@ def plan_reach(
     fidget_hz: float,
     worker: Worker,
 ) -> float:
-    """Plan to reach a point with one hand or both.
+    """Plan a reach to a point with one hand or both hands.
 
     Args:
         target: point in the world [m].
         used: 1 for each hand that reaches, else 0.
         peak_m_s: peak speed of the hand [m/s].
-        hold_s: time that the hands work there [s].
-        fidget_m: amplitude of the work [m].
-        fidget_hz: rate of the work [Hz].
-        worker: record that the plan is written into.
+        hold_s: time for which the hands work at the point [s].
+        fidget_m: amplitude of small movements at the point [m].
+        fidget_hz: frequency of small movements at the point [Hz].
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -191,13 +191,13 @@ def plan_reach(
 
 @kernel
 def plan_lift(ahead: float, z: float, times: LiftTimes, worker: Worker) -> float:
-    """Plan to lift a load with both hands, hold it and put it back.
+    """Plan a lift with both hands: raise a load, hold it and put it back.
 
     Args:
         ahead: distance of the load ahead of the feet [m].
-        z: height of its grips [m].
+        z: height of the load's grips [m].
         times: times to bend, raise and hold.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

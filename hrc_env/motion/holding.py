@@ -1,4 +1,4 @@
-"""Props in the hands: the pose of a prop determines where the hands are."""
+"""Props in the hands: the pose of a prop determines the positions of the hands."""
 
 import math
 
@@ -14,14 +14,14 @@ from hrc_env.worker.props import PROPS
 GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
 """Grips (N, 2, 3) of the left and the right hand on each prop, in the prop's frame [m]."""
 TWO_HANDED = np.array([bool(np.isfinite(prop.grips).all()) for prop in PROPS])
-"""Whether each prop (N,) is held by both hands; a tool for one hand is held at its origin."""
+"""Mask (N,) of props that both hands hold; a tool for one hand is held at its origin."""
 N_HELD = 8
-"""Columns of a held prop: kind, position (3) [m], unit quaternion (4, scalar first)."""
+"""Number of values of a held prop: kind, position (3) [m], unit quaternion (4, scalar first)."""
 
 
 @kernel
 def write_prop_pose(out: Floats, worker: Worker) -> None:
-    """Write kind, position and quaternion of the held prop into `out` (N_HELD,)."""
+    """Write the kind, position and quaternion of the held prop into `out` (N_HELD,)."""
     out[:] = 0.0
     out[0], out[4] = worker.q[c.PROP], 1.0
     if out[0] == 0.0:
@@ -40,14 +40,14 @@ def write_prop_pose(out: Floats, worker: Worker) -> None:
 
 @kernel
 def grip(side: int, gx: float, gy: float, gz: float, worker: Worker) -> None:
-    """Set the target of a hand to a point in the frame of the prop in the control vector.
+    """Set the target of a hand to a point in the frame of the held prop.
 
     Args:
         side: 0 left, 1 right.
         gx: x of the point in the prop's frame [m].
         gy: y of the point in the prop's frame [m].
         gz: z of the point in the prop's frame [m].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
@@ -64,14 +64,14 @@ def grip(side: int, gx: float, gy: float, gz: float, worker: Worker) -> None:
 
 @kernel
 def hold_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None:
-    """Put the load where a worker holds it, and both hands onto it.
+    """Set the pose of a carried load, and the targets of the hands that hold it.
 
     Args:
         x: world x of the root [m].
         y: world y of the root [m].
         yaw: heading [rad].
-        up: height of the load above that of standing [m].
-        worker: record; its `q` is changed.
+        up: height of the load relative to its height when the worker stands [m].
+        worker: record of the worker; its `q` is changed.
     """
     place_load(x, y, yaw, up, worker)
     grip_load(1.0, worker)
@@ -79,14 +79,14 @@ def hold_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None
 
 @kernel
 def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None:
-    """Put the load where a worker holds it.
+    """Set the pose of a carried load.
 
     Args:
         x: world x of the root [m].
         y: world y of the root [m].
         yaw: heading [rad].
-        up: height of the load above that of standing [m].
-        worker: record; its `q` is changed.
+        up: height of the load relative to its height when the worker stands [m].
+        worker: record of the worker; its `q` is changed.
     """
     q, at = worker.q, worker.load_at
     q[c.PROP] = worker.load_prop
@@ -97,7 +97,7 @@ def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> Non
 
 @kernel
 def grip_load(share: float, worker: Worker) -> None:
-    """Send the hands that hold the load to it, by a share."""
+    """Set the targets of the hands that hold the load, with a share of following them."""
     for side in range(2):
         held = worker.load_grip[3 * side : 3 * side + 3]
         grip(side, held[0], held[1], held[2], worker)
@@ -106,7 +106,7 @@ def grip_load(share: float, worker: Worker) -> None:
 
 @kernel
 def take_load(prop: int, worker: Worker) -> None:
-    """Let both hands hold the prop at its grips."""
+    """Plan to hold the prop with both hands at its grips."""
     worker.load_prop = prop
     worker.load_at[:] = 0.0
     for i in range(6):

@@ -1,4 +1,4 @@
-"""From a control vector to 22 body segments: a spine, and four limbs of two bones."""
+"""Kinematics from a control vector to 22 body segments: a spine and four two-bone limbs."""
 
 import math
 
@@ -10,27 +10,27 @@ from hrc_env.motion.curves import min_jerk, saturate, soft_min
 from hrc_env.motion.state import Worker
 
 ARM_KNEE = 0.97
-"""Share of the arm's length from which stretching is resisted."""
+"""Share of the arm's length beyond which the extension is compressed smoothly."""
 ARM_LIMIT = 0.998
-"""Share of the arm's length that the arm never passes."""
+"""Greatest extension of the arm, as a share of its length."""
 SHOULDER_RAD = 0.22
-"""Greatest turn of a clavicle forward, and up [rad]."""
+"""Greatest rotation of a clavicle forward and upward [rad]."""
 LEG_LIMIT = 0.998
-"""Greatest share of its length that a leg uses, so that knees never lock."""
+"""Greatest extension of a leg as a share of its length, so that the knees never lock."""
 LEG_SOFTNESS_M = 0.05
-"""Width over which the reach of the legs takes over from the wanted height of the pelvis [m]."""
+"""Width of the smooth transition from the desired pelvis height to the legs' reach [m]."""
 REST_SOFTNESS_M = 0.06
 """Height above the floor below which a falling trunk is slowed down [m]."""
 TRAILING_SHARE = 0.12
-"""Share of a leg's length by which a runner's trailing foot may be out of reach."""
+"""Distance by which a runner's trailing foot may be out of reach, as a share of leg length."""
 TRAILING_BENT = 0.06
-"""Share of the leg's length before its end at which a trailing foot begins to follow."""
+"""Share of the leg's length from full extension at which a trailing foot begins to follow."""
 HEEL_OFF_M = 0.1
-"""Height of a runner's heel at which the foot trails [m]."""
+"""Height of a runner's heel at which the foot is trailing [m]."""
 LOWER_KNEE_RAD = 0.5
-"""Roll from which both knees of a worker on their side point the same way [rad]; judgement."""
+"""Roll above which both knees of a lying worker point to the same side [rad]; judgement."""
 TARGET, POLE, HINGE, GRIP = range(22, 26)
-"""Auxiliary rows of `Worker.p`: target of a limb, pole and hinge of its middle joint, the grip."""
+"""Auxiliary rows of `Worker.p`: a limb's target, pole and hinge of its middle joint, and grip."""
 TURN = 22
 """Auxiliary row of `Worker.r`."""
 
@@ -44,7 +44,7 @@ def set_rotation(yaw: float, pitch: float, roll: float, segment: int, worker: Wo
         pitch: angle about y [rad].
         roll: angle about x [rad].
         segment: row of `r`.
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     r = worker.r
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -74,7 +74,7 @@ def multiply(a: int, b: int, out: int, worker: Worker) -> None:
 
 @kernel
 def attach(child: int, parent: int, worker: Worker) -> None:
-    """Set the child's origin to its rest offset in the parent's frame."""
+    """Set the origin of a child segment from its rest offset in the parent's frame."""
     p, r = worker.p, worker.r
     x, y, z = worker.bones[child, 0], worker.bones[child, 1], worker.bones[child, 2]
     for i in range(3):
@@ -84,13 +84,13 @@ def attach(child: int, parent: int, worker: Worker) -> None:
 
 @kernel
 def aim(bone: int, end: int, length: float, worker: Worker) -> None:
-    """Turn a bone to point from its origin to p[end], with its hinge along p[HINGE].
+    """Orient a bone from its origin towards p[end], with its hinge along p[HINGE].
 
     Args:
         bone: row of the bone.
         end: row of `p` that the bone points to.
         length: length of the bone [m].
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     p, r = worker.p, worker.r
     inverse = 1.0 / length
@@ -110,7 +110,7 @@ def aim(bone: int, end: int, length: float, worker: Worker) -> None:
 def solve_two_bones(
     start: int, end: int, first: float, second: float, knee: float, limit: float, worker: Worker
 ) -> None:
-    """Solve a chain of two bones from p[start] to p[TARGET].
+    """Solve the inverse kinematics of a two-bone chain from p[start] to p[TARGET].
 
     The middle joint p[start + 1], the end p[end] and p[HINGE] are written.
 
@@ -119,9 +119,9 @@ def solve_two_bones(
         end: row of `p` for the end of the chain.
         first: length of the first bone [m].
         second: length of the second bone [m].
-        knee: share of the chain's length from which stretching is resisted.
-        limit: share of the chain's length that the chain never passes.
-        worker: record; its `p` is written.
+        knee: share of the chain's length beyond which the extension is compressed smoothly.
+        limit: greatest extension of the chain, as a share of its length.
+        worker: record of the worker; its `p` is written.
     """
     p = worker.p
     dx = p[TARGET, 0] - p[start, 0]
@@ -149,7 +149,7 @@ def solve_two_bones(
 
 @kernel
 def pose_trunk(worker: Worker) -> None:
-    """Pose pelvis, spine, neck and head, as high as wanted and as the legs allow."""
+    """Pose pelvis, spine, neck and head at the desired height, as far as the legs reach."""
     q, p = worker.q, worker.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
     set_rotation(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, worker)
@@ -185,7 +185,7 @@ def pose_trunk(worker: Worker) -> None:
 
 @kernel
 def _rest_on_floor(worker: Worker) -> None:
-    """Raise a trunk, head included, out of the floor."""
+    """Raise the trunk and head so that they do not penetrate the floor."""
     p, r = worker.p, worker.r
     low = math.inf
     for k in range(an.N_ROUND):
@@ -201,17 +201,18 @@ def _rest_on_floor(worker: Worker) -> None:
 
 @kernel
 def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worker) -> None:
-    """Turn the pole of a limb to that of a fallen worker, by the share `fall_share`.
+    """Blend the pole of a limb with the pole of a fallen worker, by the weight `fall_share`.
 
-    The pole points along the segment's x axis, or, by the share `out`, level and outwards (elbows
-    also towards the feet). The lower knee of a worker on their side points to where they face.
+    A fallen worker's pole is a mix of the segment's x axis and, with weight `out`, a level
+    direction outwards (for elbows also towards the feet). When the worker lies on a side, the lower
+    knee points forward.
 
     Args:
         side: 0 left, 1 right.
         segment: row of the segment whose x axis is used.
         ahead: 1 for a knee, -1 for an elbow.
-        out: share of pointing outwards.
-        worker: record; its p[POLE] is changed.
+        out: weight of the outward direction.
+        worker: record of the worker; its p[POLE] is changed.
     """
     p, r = worker.p, worker.r
     left = 1.0 - 2.0 * side
@@ -226,13 +227,13 @@ def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worke
 
 @kernel
 def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
-    """Pose a clavicle, which follows the hand a little, and set p[TARGET] to the grip.
+    """Pose a clavicle, which follows the hand slightly, and set p[TARGET] to the grip.
 
     Args:
         side: 0 left, 1 right.
-        cos: cosine of the level heading of the chest.
-        sin: sine of the level heading of the chest.
-        worker: record; its `p` and `r` are written.
+        cos: cosine of the chest's heading.
+        sin: sine of the chest's heading.
+        worker: record of the worker; its `p` and `r` are written.
     """
     q, p, r = worker.q, worker.p, worker.r
     sign = 1.0 - 2.0 * side
@@ -264,13 +265,13 @@ def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
 
 @kernel
 def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
-    """Pose an arm from shoulder to hand, its elbow back and outwards.
+    """Pose an arm from shoulder to hand, with the elbow pointing back and outwards.
 
     Args:
         side: 0 left, 1 right.
-        cos: cosine of the level heading of the chest.
-        sin: sine of the level heading of the chest.
-        worker: record; its `p` and `r` are written.
+        cos: cosine of the chest's heading.
+        sin: sine of the chest's heading.
+        worker: record of the worker; its `p` and `r` are written.
     """
     p = worker.p
     pose_shoulder(side, cos, sin, worker)
@@ -302,7 +303,7 @@ def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
 
 @kernel
 def _measure_heel_lift(side: int, worker: Worker) -> float:
-    """Return the share by which a runner's heel has left the floor."""
+    """Return how far a runner's heel has left the floor, in [0, 1]."""
     return min_jerk(
         (worker.q[c.ANKLE + 6 * side + 2] - worker.lengths[an.ANKLE_Z]) / HEEL_OFF_M - 0.5
     )
@@ -310,7 +311,7 @@ def _measure_heel_lift(side: int, worker: Worker) -> float:
 
 @kernel
 def pose_leg(side: int, worker: Worker) -> None:
-    """Pose a leg from hip to toes, its knee over the foot."""
+    """Pose a leg from hip to toes, with the knee above the foot."""
     q, p, r = worker.q, worker.p, worker.r
     thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
     shank, foot, toes = thigh + 1, thigh + 2, thigh + 3
@@ -350,7 +351,7 @@ def set_pitch(cos: float, sin: float, pitch: float, segment: int, worker: Worker
         sin: sine of the yaw.
         pitch: angle about y [rad].
         segment: row of `r`.
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     r = worker.r
     cp, sp = 1.0, 0.0
@@ -363,7 +364,7 @@ def set_pitch(cos: float, sin: float, pitch: float, segment: int, worker: Worker
 
 @kernel
 def pose(worker: Worker) -> None:
-    """Fill the rows of the segments of `p` and `r` from the control vector `q`."""
+    """Compute the segments' rows of `p` and `r` from the control vector `q`."""
     q = worker.q
     pose_trunk(worker)
     yaw = q[c.HEADING] + q[c.PELVIS_YAW] + q[c.SPINE_TWIST]
@@ -411,13 +412,13 @@ def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
 def write_angular_velocity(
     before: Floats, after: Floats, segment: int, duration: float, out: Floats
 ) -> None:
-    """Write the angular velocity in the world that takes one rotation to a slightly later one.
+    """Write the angular velocity between a rotation and a slightly later one, in the world frame.
 
     Args:
         before: rotations (N, 3, 3).
-        after: the same a moment later.
+        after: rotations (N, 3, 3) a short time later.
         segment: row of `before`, `after` and `out`.
-        duration: time from one to the other [s].
+        duration: time between both [s].
         out: angular velocities (N, 3) [rad/s].
     """
     x = y = z = 0.0

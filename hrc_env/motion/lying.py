@@ -1,7 +1,7 @@
-"""Loads that lie about: in piles when an episode begins, then where workers lay them down.
+"""Loads at rest in the scene: initially in piles, later where workers lay them down.
 
-No load appears or vanishes: a worker takes up the uppermost load at a place, and a load that is
-laid down lies there from then on, on top of the loads that are there. Only a reset restores piles.
+No load appears or vanishes. A worker picks up the uppermost load at a place; a load that is laid
+down stays there, on top of the loads below it. Only a reset restores the piles.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from hrc_env.core.declared import Records1, dtype_of
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.going import CART, WHEELBARROW
@@ -27,16 +27,16 @@ from hrc_env.world import AWAY_M, WORKPLACE_KINDS, Workplace
 
 
 class Load:
-    """A load that lies somewhere; a row of kind 0 is room for another one."""
+    """A load at rest; a row of kind 0 is unused."""
 
     shown: Annotated[Floats, (N_HELD,)]
-    """Kind, position [m] and quaternion of the load, as `holding.write_prop_pose` writes them."""
+    """Kind, position [m] and quaternion of the load, in the format of `holding.write_prop_pose`."""
     pose: Annotated[Floats, (6,)]
     """Pose in the world: x, y, z [m], yaw, pitch, roll [rad]."""
     stand: Annotated[Floats, (4,)]
-    """Place from which it is taken up: x, y [m], heading [rad], height [m]."""
+    """Place from which the load is picked up: x, y [m], heading [rad], height [m]."""
     at: int
-    """Kind of that place, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
+    """Kind of the place `stand`, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
 
 
 @with_fields(Load)
@@ -45,34 +45,34 @@ class LoadRow(np.void):
 
 
 LOAD = np.dtype((LoadRow, dtype_of(Load)))
-"""NumPy's type of a `Load`; its rows have attributes in Python, too."""
+"""NumPy data type of a `Load`; the fields of its rows are attributes in Python, too."""
 MOVED_M = 0.015
-"""Greatest displacement of a load in a pile from its place, along x and y [m]."""
+"""Greatest random displacement of a load in a pile along x and y [m]."""
 TURNED_RAD = 0.03
-"""Greatest turn of a load in a pile from its place [rad]."""
+"""Greatest random rotation of a load in a pile [rad]."""
 HIGH = ("pile", "bench", "task")
-"""Kinds of places with a surface, at the place's height, on which loads lie.
+"""Kinds of places with a surface for loads at the place's height.
 
-At other places the loads lie on the floor, or hang on the wall.
+At other places, loads rest on the floor or hang on the wall.
 """
 HUNG_M = 1.2
-"""Greatest height of boards at a wall [m]; judgement."""
+"""Greatest height of boards that hang on a wall [m]; judgement."""
 AT_HAND_M = 0.13
-"""Distance from the place of a load within which it can be taken up [m]."""
+"""Distance from the place of a load within which a worker can pick it up [m]."""
 EXACT_M = 0.01
-"""Distance from the place of a cart within which it can be taken [m]."""
+"""Distance from the place of a cart within which a worker can grasp it [m]."""
 EXACT_COS = 0.9999
-"""Least cosine of the heading from that of the place of a cart, which can then be taken."""
+"""Least cosine of the heading error at the place of a cart for which a worker can grasp it."""
 WHEELED = (CART, WHEELBARROW)
-"""Props that are taken by their handles."""
+"""Props that are held by their handles."""
 ROOM_M = 0.40
-"""Distance of paths from the middle of a load, beyond half its shorter side [m]."""
+"""Distance of paths from a load's centre, in addition to half its shorter side [m]."""
 TOUCH_M = 0.01
-"""Overlap up to which two loads lie beside each other [m]."""
+"""Overlap up to which two loads count as lying beside each other [m]."""
 
 
 class Extent(NamedTuple):
-    """Vertical extent of a load from its origin."""
+    """Vertical extent of a load relative to its origin."""
 
     low: float
     """Lower end [m]."""
@@ -84,15 +84,16 @@ class Footprints(NamedTuple):
     """Rectangles that loads cover on the floor."""
 
     middle: Floats
-    """Middles (n, 2) in the world [m]."""
+    """Centres (n, 2) in the world [m]."""
     half: Floats
-    """Half edges (n, 2) along and across the loads [m]."""
+    """Half sizes (n, 2) along and across the loads [m]."""
 
 
 def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Load]:
-    """Return the loads (L,) that lie at places when an episode begins.
+    """Return the loads (L,) at the workplaces when an episode begins.
 
-    The first place of a kind has a load that a job takes up there, if no place of its kind has one.
+    If a job needs a load at a kind of workplace and the scene has none there, the load is added to
+    the first workplace of that kind.
     """
     wanted = {(job.prop, job.at) for job in jobs if job.activity == "pick up"}
     wanted -= {(prop, place.kind) for place in places for prop in place.loads}
@@ -103,7 +104,7 @@ def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Loa
         stand = get_place(place)
         for prop in (*place.loads, *more):
             if prop not in PROP_NAMES[1:]:
-                raise unknown(f"load at {place.name!r}", prop, PROP_NAMES[1:])
+                raise make_unknown_name_error(f"load at {place.name!r}", prop, PROP_NAMES[1:])
             kind = PROP_NAMES.index(prop)
             row = np.zeros(1, LOAD)
             row["shown"][0, 0] = kind
@@ -114,16 +115,16 @@ def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Loa
 
 
 def get_place(place: Workplace) -> Place:
-    """Return where a worker stands at a workplace."""
+    """Return the pose at which a worker stands at a workplace."""
     return Place(*place.xy_m, place.yaw_rad, place.height_m)
 
 
 def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Generator) -> None:
-    """Fill the rows of an environment with the loads of the beginning, a little off their places.
+    """Reset the loads of an environment to the initial ones, with small random displacements.
 
     Args:
         loads: rows of the environment, which are written.
-        first: loads of the beginning, as `make_loads` returns them.
+        first: initial loads, from `make_loads`.
         rng: generator of the displacements.
     """
     loads[...] = np.zeros((), LOAD)
@@ -140,16 +141,17 @@ def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Gen
 def find_rest_pose(
     kind: int, at: str, stand: Place, ahead_m: float, loads: Records1[Load]
 ) -> Floats:
-    """Return the pose (6,) at which a load rests that is laid down at a place.
+    """Return the rest pose (6,) of a load that is laid down at a place.
 
-    A board rests flat on a wall, below the boards there; all other loads rest on top of others.
+    A board at a wall hangs flat on it, below other boards there; any other load rests on top of the
+    loads below it.
 
     Args:
         kind: kind of the load, an index into `PROPS`.
         at: kind of the place; "" for none.
-        stand: where the worker stands.
+        stand: pose at which the worker stands.
         ahead_m: distance of the load ahead of the worker [m].
-        loads: loads that lie about.
+        loads: loads at rest in the scene.
     """
     is_hung = at == "wall" and kind == BOARD
     low, high = _measure_extent(kind, is_hung)
@@ -167,7 +169,7 @@ def find_rest_pose(
 
 
 def find_uncovered(loads: Records1[Load]) -> Bools:
-    """Return which rows (L,) hold a load that bears no other."""
+    """Return a mask (L,) of the loads without another load on top."""
     free = loads["shown"][:, 0] > 0
     for row in np.flatnonzero(free):
         over = _find_overlapping(int(loads["shown"][row, 0]), loads["pose"][row], loads)
@@ -176,7 +178,7 @@ def find_uncovered(loads: Records1[Load]) -> Bools:
 
 
 def list_stands(loads: Records1[Load], kind: int, at: str) -> Iterator[Place]:
-    """Yield the places from which loads of a kind at places of a kind can be taken up."""
+    """Yield the places of a kind from which loads of a kind can be picked up."""
     here = find_uncovered(loads) & (loads["shown"][:, 0] == kind)
     here &= loads["at"] == WORKPLACE_KINDS.index(at)
     for row in loads["stand"][here]:
@@ -184,7 +186,7 @@ def list_stands(loads: Records1[Load], kind: int, at: str) -> Iterator[Place]:
 
 
 def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
-    """Return the row of a load of a kind that a worker can take up on the spot; -1 for none."""
+    """Return the row of a load of a kind that a worker can pick up on the spot; -1 for none."""
     x, y, yaw = loads["stand"][:, :3].T
     away = np.hypot(x - worker.start_x, y - worker.start_y)
     near = find_uncovered(loads) & (loads["shown"][:, 0] == kind) & (away < AT_HAND_M)
@@ -194,18 +196,18 @@ def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
 
 
 def has_load_at(loads: Records1[Load], stand: Place) -> bool:
-    """Return whether a load lies there that is taken up from a place."""
+    """Return whether any load is picked up from near the place `stand`."""
     away = np.hypot(*(loads["stand"][:, :2] - stand[:2]).T)
     return bool(((loads["shown"][:, 0] > 0) & (away < AT_HAND_M)).any())
 
 
 def has_load(loads: Records1[Load], kind: int) -> bool:
-    """Return whether a load of a kind lies anywhere."""
+    """Return whether there is a load of a kind."""
     return bool((loads["shown"][:, 0] == kind).any())
 
 
 def remove_load(loads: Records1[Load], row: int) -> None:
-    """Remove a load that a worker has taken up."""
+    """Remove a load that a worker has picked up."""
     loads[row] = np.zeros((), LOAD)
 
 
@@ -221,7 +223,7 @@ def find_place_here(places: Sequence[Workplace], worker: Worker) -> Workplace | 
 def find_rest_pose_here(
     loads: Records1[Load], places: Sequence[Workplace], worker: Worker
 ) -> Floats:
-    """Return the pose (6,) at which a worker's load rests when it is laid down on the spot."""
+    """Return the rest pose (6,) of a worker's load if it is laid down on the spot."""
     kind, place = int(worker.load_prop), find_place_here(places, worker)
     if place is None:
         here = Place(float(worker.start_x), float(worker.start_y), float(worker.start_yaw), 0.0)
@@ -230,7 +232,7 @@ def find_rest_pose_here(
 
 
 def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Worker) -> None:
-    """Add the load at the end of a worker's activity to those that lie about."""
+    """Add the load that a worker has laid down in an activity to the loads at rest."""
     free = np.flatnonzero(loads["shown"][:, 0] == 0)
     if not len(free):
         return
@@ -244,20 +246,20 @@ def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Wo
 
 
 def list_load_discs(loads: Records1[Load]) -> Floats:
-    """Return discs (n, 3) that paths go around: x, y, radius [m]."""
+    """Return discs (n, 3) around loads that paths must avoid: x, y, radius [m]."""
     lying = loads[loads["shown"][:, 0] > 0]
     middle, half = _project(lying["shown"][:, 0], lying["pose"])
     return np.concatenate([middle, ROOM_M + half.min(1, keepdims=True)], axis=1)
 
 
 def _measure_extent(kind: int, is_hung: bool) -> Extent:
-    """Return the vertical extent of a load of a kind, hung on a wall or lying."""
+    """Return the vertical extent of a load of a kind, hanging on a wall or lying."""
     axis = 0 if is_hung else 2
     return Extent(float(BOUNDS_M[kind, 0, axis]), float(BOUNDS_M[kind, 1, axis]))
 
 
 def _find_overlapping(kind: int, pose: Floats, loads: Records1[Load]) -> Bools:
-    """Return which loads (L,) are above or below one of a kind at a pose (6,)."""
+    """Return a mask (L,) of the loads above or below a load of a kind at a pose (6,)."""
     middle, half = _project(np.array([kind]), pose[None])
     middles, halves = _project(loads["shown"][:, 0], loads["pose"])
     off, yaws = middles - middle, loads["pose"][:, 3]
@@ -270,7 +272,7 @@ def _find_overlapping(kind: int, pose: Floats, loads: Records1[Load]) -> Bools:
 
 
 def _project(kind: Floats, poses: Floats) -> Footprints:
-    """Return the rectangles of loads of kinds (n,) at poses (n, 6)."""
+    """Return the rectangles that loads of kinds (n,) at poses (n, 6) cover on the floor."""
     box = BOUNDS_M[kind.astype(int), :, :2]
     (ahead, left), half = box.mean(1).T, 0.5 * (box[:, 1] - box[:, 0])
     cos, sin = np.cos(poses[:, 3]), np.sin(poses[:, 3])
@@ -279,5 +281,5 @@ def _project(kind: Floats, poses: Floats) -> Footprints:
 
 
 def _measure_half_width(half: Floats, turn_rad: Floats) -> Floats:
-    """Return half the widths (n,) of rectangles along axes at an angle to them."""
+    """Return half the extents (n,) of rectangles along axes at an angle to them."""
     return half[:, 0] * np.abs(np.cos(turn_rad)) + half[:, 1] * np.abs(np.sin(turn_rad))

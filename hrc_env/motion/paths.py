@@ -1,8 +1,8 @@
-"""A path over the floor: straight lines joined by arcs, by the distance walked along it.
+"""Paths over the floor: straight lines joined by arcs, parameterized by arc length.
 
-The columns of a piece (a row of `Worker.path`) are the distance before it [m], x, y [m], the
-direction at its beginning [rad] (not wrapped), its curvature [1/m] and the integral of the
-direction up to it [rad m].
+The columns of a piece (a row of `Worker.path`) are the arc length at its beginning [m]; x, y [m]
+and the direction [rad] (not wrapped) there; its curvature [1/m]; and the integral of the direction
+over the arc length up to there [rad m].
 """
 
 import math
@@ -14,23 +14,23 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import MAX_VIA, Worker
 
 HEADING_WINDOW_M = 0.3
-"""Distance to both sides over which walkers average the direction (Grasso et al. 1998) [m]."""
+"""Half width of the window over which the direction is averaged (Grasso et al. 1998) [m]."""
 OWN_EDGE = 0.9
-"""Greatest share of the first or last edge that the arc of a corner takes."""
+"""Greatest share of the first or last edge that the arc of a corner occupies."""
 SHARED_EDGE = 0.5
-"""Greatest share of an edge between two corners that the arc of either takes."""
+"""Greatest share of an edge between two corners that the arc of either corner occupies."""
 
 
 @kernel
 def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
-    """Write the path past some corners, its length and its greatest curvature.
+    """Write the path through some corners, its length and its greatest curvature.
 
     Args:
-        start: its first point.
+        start: first point of the path.
         via: corners (n, 3): x, y, and the distance before the corner at which its arc may begin
             [m].
-        end: its last point.
-        worker: record that the path is written into.
+        end: last point of the path.
+        worker: record into which the path is written.
     """
     worker.end_x, worker.end_y = end.x, end.y
     n = min(via.shape[0], MAX_VIA)
@@ -45,7 +45,7 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
             next_x, next_y = (via[k + 1, 0], via[k + 1, 1]) if k + 1 < n else (end.x, end.y)
             turn = wrap(math.atan2(next_y - to_y, next_x - to_x) - heading)
             before, after = math.hypot(to_x - x, to_y - y), math.hypot(next_x - to_x, next_y - to_y)
-            own_share = OWN_EDGE if k == 0 else 1.0  # all that the corner before has left
+            own_share = OWN_EDGE if k == 0 else 1.0  # the rest after the previous corner's arc
             next_share = SHARED_EDGE if k + 1 < n else OWN_EDGE
             arm = min(via[k, 2], own_share * before, next_share * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)
@@ -75,7 +75,7 @@ def _find_piece(distance: float, worker: Worker) -> int:
 
 @kernel
 def locate_on_path(distance: float, worker: Worker) -> Point:
-    """Return the point of the path after a distance [m], held at its ends."""
+    """Return the point at a distance [m] along the path, clamped to its ends."""
     distance = min(max(distance, 0.0), worker.length)
     piece = worker.path[_find_piece(distance, worker)]
     way, heading, curvature = distance - piece[0], piece[3], piece[4]
@@ -87,7 +87,7 @@ def locate_on_path(distance: float, worker: Worker) -> Point:
 
 @kernel
 def average_heading(distance: float, worker: Worker) -> float:
-    """Return the mean direction of the path around a distance [m] along it [rad].
+    """Return the mean direction of the path near a distance [m] along it [rad].
 
     The direction and its rate are continuous.
     """
@@ -101,7 +101,7 @@ def average_heading(distance: float, worker: Worker) -> float:
 def _integrate_heading(distance: float, worker: Worker) -> float:
     """Return the integral of the direction from 0 to a distance [m] along the path [rad m].
 
-    The path goes on straight at its ends.
+    The path is extended by straight lines at its ends.
     """
     within = min(max(distance, 0.0), worker.length)
     piece = worker.path[_find_piece(within, worker)]

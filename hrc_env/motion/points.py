@@ -1,4 +1,4 @@
-"""Points, poses and places on the floor, and pairs of numbers that belong together.
+"""Points, poses and places on the floor, and pairs of related numbers.
 
 Kernels take and return these named tuples; points in space are `hrc_env.core.typing.Vector3`.
 """
@@ -27,7 +27,7 @@ class FloorPose(NamedTuple):
 
 
 class Place(NamedTuple):
-    """A spot where a worker stands, with the height of the work there."""
+    """A pose at which a worker stands, with the height of the work there."""
 
     x: float
     """World x [m]."""
@@ -40,7 +40,7 @@ class Place(NamedTuple):
 
 
 class SagittalShift(NamedTuple):
-    """A displacement in the vertical plane through a heading."""
+    """A displacement in the vertical plane that contains a heading."""
 
     ahead: float
     """Displacement along the heading [m]."""
@@ -49,7 +49,7 @@ class SagittalShift(NamedTuple):
 
 
 class Sides(NamedTuple):
-    """One number for the left and one for the right hand."""
+    """A value for the left and one for the right hand."""
 
     left: float
     """Value of the left hand."""

@@ -1,4 +1,4 @@
-"""Standing at ease, and how a trunk follows hands that are wanted somewhere."""
+"""Relaxed standing, and leaning of the trunk towards the targets of the hands."""
 
 import math
 
@@ -12,38 +12,38 @@ from hrc_env.motion.points import Point, Sides
 from hrc_env.motion.state import Worker
 
 STANCE_HALF_WIDTH_M = 0.10
-"""Distance of the ankles from the middle when standing [m]; shoulder width of the baked bodies."""
+"""Half the distance between the ankles in standing [m]; shoulder width of the baked bodies."""
 TOE_OUT_RAD = 0.12
-"""Outward turn of the feet, standing and walking [rad]; about 7 degrees."""
+"""Outward turn of the feet in standing and walking [rad]; about 7 degrees."""
 SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
-"""Rates of a standing person's sway, incommensurable [Hz]; judgement."""
+"""Incommensurable frequencies of a standing person's sway [Hz]; judgement."""
 SHIFT_M = 0.018
-"""Amplitude of the weight shift [m]; judgement."""
+"""Amplitude of the lateral weight shift [m]; judgement."""
 RELAXED_PITCH = 0.02
-"""Forward turn of a hanging upper arm [rad]; judgement."""
+"""Forward rotation of a hanging upper arm [rad]; judgement."""
 RELAXED_ELBOW = 0.38
 """Bend of the elbow of a hanging arm [rad]; judgement."""
 RELAXED_OUT = 0.26
-"""Turn of a hanging upper arm away from the trunk [rad]; judgement."""
+"""Abduction of a hanging upper arm from the trunk [rad]; judgement."""
 HAND_OUT_M = 0.05
-"""Distance of a hanging hand outwards of its elbow [m], also beside broad hips; judgement."""
+"""Lateral distance of a hanging hand from its elbow [m], to clear broad hips; judgement."""
 MOST_LEAN = 1.3
-"""Lean beyond which a person would step instead."""
+"""Greatest lean; a person would take a step instead of leaning further."""
 NECK_SHARE = 0.70
-"""Height of the eyes above the pelvis as a share of the pelvis's height, from the baked bodies."""
+"""Height of the eyes above the pelvis as a share of pelvis height, from the baked bodies."""
 HEAD_SHARE = 0.75
-"""Share of the head in a turn of gaze; the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
+"""Share of the head in a gaze shift besides the eyes (Freedman & Sparks 1997: 70-80 %)."""
 MOST_YAW_RAD = 1.2
-"""Greatest turn of the head from the chest to a side [rad]; comfortable range, judgement."""
+"""Greatest yaw of the head relative to the chest [rad]; comfortable range, judgement."""
 MOST_DOWN_RAD = 0.75
-"""Greatest turn of the head from the chest downwards [rad]; comfortable range, judgement."""
+"""Greatest downward pitch of the head from the chest [rad]; comfortable range, judgement."""
 MOST_UP_RAD = 0.75
-"""Greatest turn of the head from the chest upwards [rad]; comfortable range, judgement."""
+"""Greatest upward pitch of the head from the chest [rad]; comfortable range, judgement."""
 
 
 @kernel
 def sway(clock_s: float, i: int, worker: Worker) -> float:
-    """Return a slow wave in [-1, 1] with the worker's own phase.
+    """Return a slow wave in [-1, 1] with a phase of the worker.
 
     Args:
         clock_s: time since the episode began [s].
@@ -55,13 +55,13 @@ def sway(clock_s: float, i: int, worker: Worker) -> float:
 
 @kernel
 def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
-    """Let an arm hang.
+    """Set the hand offset of a hanging arm.
 
     Args:
         side: 0 left, 1 right.
-        pitch: turn of the upper arm forward from the vertical [rad].
+        pitch: forward rotation of the upper arm from the vertical [rad].
         elbow: bend of the elbow [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     sign = 1.0 - 2.0 * side
@@ -77,14 +77,14 @@ def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
 
 @kernel
 def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> None:
-    """Fill every column but those of the feet: at ease, shifting weight, looking about.
+    """Write all columns except those of the feet for relaxed standing with sway and gaze shifts.
 
     Args:
         x: world x of the root [m].
         y: world y of the root [m].
         yaw: heading [rad].
         clock_s: time since the episode began [s].
-        worker: record; its `q` is written.
+        worker: record of the worker; its `q` is written.
     """
     q = worker.q
     first, second, third = (
@@ -114,13 +114,13 @@ def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> Non
 
 @kernel
 def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
-    """Bend the trunk forward, the pelvis going back, and turn it.
+    """Bend the trunk forward while the pelvis moves back, and twist it.
 
     Args:
         amount: lean; 1 is a deep bow.
-        squat: share of the lean that the knees take.
-        twist: turn to the left [rad].
-        worker: record; its `q` is changed.
+        squat: share of the lean that is achieved by bending the knees.
+        twist: twist of the trunk to the left [rad].
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], -(0.07 + 0.10 * squat) * amount, 0.0)
@@ -134,7 +134,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
 
 @kernel
 def measure_overreach(worker: Worker) -> float:
-    """Return the distance of the hands' targets beyond the reach of the arms [m]."""
+    """Return the distance by which the hands' targets are beyond the reach of the arms [m]."""
     used = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1])
     far = find_farthest(UPPER_ARM, worker.q[c.HAND_TARGET :], used, worker)
     return max(far - ARM_KNEE * worker.lengths[ARM], -1.0)
@@ -163,7 +163,7 @@ def find_farthest(segment: int, goals: Floats, used: Sides, worker: Worker) -> f
 
 @kernel
 def locate_ahead(ahead: float, left: float, height: float, worker: Worker) -> Vector3:
-    """Return a point relative to where the worker's activity begins, in the world.
+    """Return the world position of a point relative to the worker's pose before the activity.
 
     Args:
         ahead: distance along the heading [m].
@@ -177,7 +177,7 @@ def locate_ahead(ahead: float, left: float, height: float, worker: Worker) -> Ve
 
 @kernel
 def locate_from_root(ahead: float, left: float, worker: Worker) -> Point:
-    """Return a point of the floor relative to the root in the control vector.
+    """Return the world position of a floor point relative to the root in the control vector.
 
     Args:
         ahead: distance along the heading [m].
@@ -190,14 +190,14 @@ def locate_from_root(ahead: float, left: float, worker: Worker) -> Point:
 
 @kernel
 def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
-    """Turn the head to a point in the world, by a share; all other columns are set before.
+    """Turn the head towards a point in the world; all other columns must have been set before.
 
     Args:
         x: world x of the point [m].
         y: world y of the point [m].
         z: world z of the point [m].
-        share: share of the turn.
-        worker: record; its `q` is changed.
+        share: share of the full turn.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     if share <= 0.0:

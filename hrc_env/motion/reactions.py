@@ -1,7 +1,7 @@
-"""Reactions to the robot: workers pause, or withdraw their hands and step back.
+"""Workers' reactions to the robot: they pause, or withdraw their hands and step back.
 
-Hands pause or are withdrawn by halting or reversing the clock of their activity; walkers brake.
-Kind and delay of a reaction are drawn when an activity begins.
+Hands pause or withdraw as the clock of their activity halts or runs backwards; walkers brake.
+The kind and delay of a reaction are drawn when an activity begins.
 """
 
 import math
@@ -19,32 +19,32 @@ from hrc_env.motion.traffic import find_meeting, is_on_path
 from hrc_env.motion.walk import brake
 
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
-"""Segments that people guard."""
+"""Segments near which workers notice the robot."""
 MEETS_M = 0.20
-"""Greatest distance by which a taking hand moves to the tool that is offered [m]; judgement."""
+"""Greatest distance by which a hand adapts to the position of an offered tool [m]; judgement."""
 MEETS_M_S = 0.30
-"""Speed at which a taking hand moves to the tool that is offered [m/s]; judgement."""
+"""Speed at which a hand adapts to the position of an offered tool [m/s]; judgement."""
 WAITS_SHARE = 0.4
-"""Share of the way down to a load after which a worker does not wait for the robot; judgement."""
+"""Share of bending down after which a worker no longer waits for the robot; judgement."""
 WITHDRAW = -1.6
-"""Pace at which hands are withdrawn."""
+"""Pace of the activity's clock while hands are withdrawn."""
 MACHINE_S = 2.0
-"""Time over which walkers predict a driving machine [s]; judgement."""
+"""Time horizon over which walkers predict the motion of a mobile robot [s]; judgement."""
 MACHINE_CALM_S = 0.4
-"""Time after a reaction without another reaction to a driving machine [s]; judgement."""
+"""Time after a reaction to a mobile robot without another reaction [s]; judgement."""
 
 
 class NoticeParams(NamedTuple):
-    """When workers notice the robot."""
+    """Conditions under which workers notice the robot."""
 
     notice_m: float
     """Distance within which a part of the robot is noticed [m]."""
     fast_m_s: float
-    """Approach speed above which the arm is noticed from twice that distance [m/s]."""
+    """Approach speed above which the arm is noticed within twice `notice_m` [m/s]."""
     calm_s: float
-    """Time after a reaction in which nothing startles a worker [s]."""
+    """Time after a reaction during which a worker does not react again [s]."""
     base_radius_m: float
-    """Reach of a driving robot around the points that are watched [m]; 0 for an arm."""
+    """Radius of a mobile robot around the points that are watched [m]; 0 for an arm."""
 
 
 @kernel
@@ -56,14 +56,14 @@ def notice_robot(
     velocity_world: Floats,
     workers: Records2[Worker],
 ) -> None:
-    """Let all workers look at the robot, and react when their delay is over.
+    """Update which workers notice the robot, and begin reactions that are due.
 
     Args:
-        dt_s: time since the last look [s].
-        params: when workers notice the robot.
+        dt_s: time since the last call [s].
+        params: conditions under which workers notice the robot.
         robot_world: two points (B, 2, 3) of the robot [m].
         position_world: origins (B, W, 22, 3) of the workers' segments [m].
-        velocity_world: their velocities [m/s].
+        velocity_world: velocities (B, W, 22, 3) of the segments' origins [m/s].
         workers: records (B, W), which are changed.
     """
     for b, w in np.ndindex(workers.shape):
@@ -96,11 +96,11 @@ def notice_robot(
 
 @kernel
 def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[Worker]) -> None:
-    """Let workers follow the signal of the task.
+    """Update the activities of workers that follow the signal of the task.
 
-    The stages are 0 (not yet), 1 (the robot is in place) and 2 (the tool is released). Work on the
-    robot's workpiece halts until stage 1. A taking hand waits for stage 2, and moves to what is
-    offered.
+    The stages are 0 (not ready), 1 (the robot is in position) and 2 (the tool is released). Work on
+    the robot's workpiece halts until stage 1. A hand that takes a tool waits for stage 2, and moves
+    to the offered tool.
 
     Args:
         stage: stage (B,) of the signal.
@@ -124,12 +124,12 @@ def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[W
 
 @kernel
 def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
-    """Move the target of a taking hand towards the offered point, if that is close.
+    """Move the target of a hand that takes a tool towards the offered point, if that is close.
 
     Args:
         offered: point (3,) at which the tool is offered [m].
         dt_s: time since the last call [s].
-        worker: record; its target is changed.
+        worker: record of the worker; its target is changed.
     """
     goal, squared = worker.target[3 * worker.side : 3 * worker.side + 3], 0.0
     for i in range(3):
@@ -146,10 +146,10 @@ def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
 
 @kernel
 def _is_load_in_use(params: NoticeParams, robot: Floats, worker: Worker) -> bool:
-    """Return whether hands must wait because a point of the robot is close to the load.
+    """Return whether a worker must wait because the robot is close to the load to be picked up.
 
     Args:
-        params: when workers notice the robot.
+        params: conditions under which workers notice the robot.
         robot: two points (2, 3) of the robot [m].
         worker: record of the worker.
     """
@@ -168,14 +168,14 @@ def _is_load_in_use(params: NoticeParams, robot: Floats, worker: Worker) -> bool
 def _is_arm_startling(
     dt_s: float, params: NoticeParams, robot: Floats, body: Floats, worker: Worker
 ) -> bool:
-    """Return whether a point of the arm is close, or approaches fast.
+    """Return whether a point of the arm is close to the worker, or approaches fast.
 
     Args:
-        dt_s: time since the last look [s].
-        params: when workers notice the robot.
+        dt_s: time since the last call [s].
+        params: conditions under which workers notice the robot.
         robot: two points (2, 3) of the robot [m].
         body: origins (22, 3) of the worker's segments [m].
-        worker: record with the last look.
+        worker: record with the robot's position at the last call.
     """
     for segment in BODY_POINTS:
         for k in range(robot.shape[0]):
@@ -203,19 +203,17 @@ def _is_machine_startling(
     chest_velocity: Floats,
     worker: Worker,
 ) -> bool:
-    """Return whether a driving machine is too close, or soon will be to a walker.
+    """Return whether a mobile robot is too close, or soon will be too close to a walker.
 
-    Distances are seen from above.
-
-    Walkers that take notice of robots at all never overlook a machine.
+    Distances are horizontal. Walkers that notice robots at all never overlook a mobile robot.
 
     Args:
-        dt_s: time since the last look [s].
-        params: when workers notice the robot.
+        dt_s: time since the last call [s].
+        params: conditions under which workers notice the robot.
         robot: two points (2, 3) of the robot [m].
         chest_world: position (3,) of the worker's chest [m].
         chest_velocity: velocity (3,) of the chest [m/s].
-        worker: record with the last look.
+        worker: record with the robot's position at the last call.
     """
     walks = is_on_path(worker.activity)
     if params.notice_m == 0.0 or not (walks or worker.planned_reaction != st.NO_REACTION):
@@ -263,7 +261,7 @@ def _react(w: int, workers: Records1[Worker]) -> None:
 
 @kernel(makes_arrays=True)
 def _brake(w: int, workers: Records1[Worker]) -> bool:
-    """Brake a walker unless another one would come too close; return whether they brake."""
+    """Brake a walker unless another one would come too close; return whether the walker brakes."""
     before = np.empty(1, WORKER)
     before[0] = workers[w]
     duration_s = brake(workers[w].time_s, workers[w])

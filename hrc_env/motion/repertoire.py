@@ -1,4 +1,4 @@
-"""All activities of workers, in scenes of one or a few activities, for reports and pictures."""
+"""All activities of workers as scenes of one or a few activities, for reports and pictures."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -27,9 +27,9 @@ from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
 AWAY_M = 3.0
-"""Length of a path [m]."""
+"""Default length of a path [m]."""
 FAR_M = 8.0
-"""Length of the walks that are measured [m]."""
+"""Length of the walks and runs that are evaluated [m]."""
 OPEN = FloorGrid(np.full((401, 401), 9.0), np.full(2, -10.0))
 """An empty floor, 10 m to each side."""
 
@@ -40,14 +40,14 @@ class Act(NamedTuple):
     activity: int
     """Index into `ACTIVITY_NAMES`."""
     start: Start
-    """Start function of the activity."""
+    """Function that plans the activity."""
     height_m: float
     """Height of the work [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """The performance of one activity."""
+    """Recorded performance of one activity."""
 
     activity: int
     """Index into `ACTIVITY_NAMES`."""
@@ -85,13 +85,13 @@ def make_worker(
 def perform(
     acts: Sequence[Act], worker: Worker, rng: np.random.Generator, dt_s: float
 ) -> list[Film]:
-    """Return films of activities in their order; the worker stands where the last one ends.
+    """Perform activities in sequence and return a film of each; the worker ends at the last pose.
 
     Args:
-        acts: the activities.
+        acts: activities in their order.
         worker: record of the worker, which is changed.
         rng: generator of the draws.
-        dt_s: interval of the films [s].
+        dt_s: sampling interval of the films [s].
     """
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
@@ -105,12 +105,12 @@ def perform(
 
 
 def _record(worker: Worker, time_s: Floats, clock_s: float) -> Film:
-    """Return the film of an activity; angular velocities are zero.
+    """Return the film of an activity, with angular velocities of zero.
 
     Args:
         worker: record with the plan.
         time_s: times (T,) since the activity began [s].
-        clock_s: clock at which it began [s].
+        clock_s: episode time at which the activity began [s].
     """
     moments = np.full((len(time_s), 1), worker, WORKER)
     moments["time_s"][:, 0], moments["clock_s"][:, 0] = time_s, clock_s + time_s
@@ -120,7 +120,7 @@ def _record(worker: Worker, time_s: Floats, clock_s: float) -> Film:
 
 
 def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = AWAY_M) -> Act:
-    """Return an activity of going some way ahead.
+    """Return an activity that moves straight ahead.
 
     Args:
         activity: index into `ACTIVITY_NAMES`.
@@ -130,7 +130,7 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
     """
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
-        """Lay the path and start to go along it."""
+        """Lay the path and plan to go along it."""
         x, y, yaw = float(worker.start_x), float(worker.start_y), float(worker.start_yaw)
         lay_path(Point(x, y), np.zeros((0, 3)), move_point(x, y, yaw, way_m, 0.0), worker)
         if activity == st.RUN:
@@ -144,19 +144,19 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
 
 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
-    """Return the activity of hammering with taps or blows."""
+    """Return the activity of hammering with light taps or with blows."""
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
-        """Start to hammer with taps or blows."""
+        """Plan to hammer with light taps or with blows."""
         chosen = draws.copy()
-        chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
+        chosen[2] = 0.0 if lightly else 1.0  # this draw decides between taps and blows
         return STARTS[st.HAMMER](chosen, height_m, worker)
 
     return (Act(st.HAMMER, start, height_m),)
 
 
 def _turn(draws: Floats, height_m: float, worker: Worker) -> float:
-    """Start to turn on the spot by a drawn angle."""
+    """Plan to turn on the spot by a random angle."""
     turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
     return start_turn(float(worker.start_yaw) + turn, worker)
 
@@ -165,7 +165,7 @@ def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
     """Return the activity of picking up a load."""
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
-        """Start to pick up the load."""
+        """Plan to pick up the load."""
         return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, worker), worker)
 
     return Act(st.PICK_UP, start, height_m)
@@ -177,7 +177,7 @@ def _here(activity: int, height_m: float = 0.0) -> tuple[Act, ...]:
 
 
 def _stand(draws: Floats, height_m: float, worker: Worker) -> float:
-    """Stand for four seconds."""
+    """Plan to stand for four seconds."""
     return 4.0
 
 
@@ -219,11 +219,11 @@ HASTY: dict[str, tuple[Act, ...]] = {
     **{f"run {v} m/s": (_going(st.RUN, v, way_m=FAR_M),) for v in (2.5, 3.0, 3.5)},
     "fall": (_going(st.FALL, 1.2),),
 }
-"""Scenes of running and falling; no emulator is fitted to them."""
+"""Scenes of running and falling by name; no emulator is fitted to them."""
 FOR_TASKS: dict[str, tuple[Act, ...]] = {
     "screw below each other": _here(st.SCREW, 1.5),
     "take what is brought": _here(st.TAKE, 1.15),
 }
-"""Scenes of activities for tasks."""
+"""Scenes of the activities in tasks, by name."""
 SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
-"""All scenes."""
+"""All scenes by name."""

@@ -1,4 +1,4 @@
-"""Paths around objects and people: A* on a grid (Hart, Nilsson and Raphael 1968), pulled tight."""
+"""Paths around objects and people: A* on a grid (Hart et al. 1968) with shortcuts."""
 
 import heapq
 import math
@@ -14,11 +14,11 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import MAX_VIA, Worker
 
 STRIDE = 3
-"""Cells of the floor's grid from node to node of the search; 15 cm."""
+"""Distance between nodes of the search, in cells of the floor's grid; 15 cm."""
 SAMPLE_M = 0.06
-"""Distance of the points of a line that are checked [m]."""
+"""Distance between the points of a line that are checked [m]."""
 EASE_M = 0.7
-"""Distance from an end of a path within which it may be as close to objects as that end [m]."""
+"""Distance from an end of a path within which less slack than required is accepted [m]."""
 SEARCHED_M = 0.05
 """Least slack of nodes of the search [m]."""
 PULLED_M = 0.03
@@ -26,16 +26,16 @@ PULLED_M = 0.03
 WALKED_M = -0.02
 """Least slack of the path with its arcs [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
-"""Greatest distance before a corner at which its arc begins, tried in turn [m]."""
+"""Distances before a corner at which its arc may begin, tried in turn [m]."""
 BOW_SHARE = 0.12
-"""Sideways bow of a free path as a share of its length, as people do not walk straight."""
+"""Lateral bow of a free path as a share of its length, because people do not walk straight."""
 
 
 class Ground(NamedTuple):
-    """Obstacles of a path."""
+    """Obstacles for a path."""
 
     ends: Floats
-    """Ends of the path (2, 3): x, y, slack [m]."""
+    """Ends (2, 3) of the path: x, y, slack [m]."""
     discs: Floats
     """Temporary obstacles (n, 3): x, y, radius [m]."""
     grid: FloorGrid
@@ -91,15 +91,15 @@ def is_line_free(x0: float, y0: float, x1: float, y1: float, margin: float, grou
 def find_route(
     start: Point, end: Point, bow: float, discs: Floats, grid: FloorGrid, worker: Worker
 ) -> bool:
-    """Find a path and lay it, if there is one.
+    """Find a path and write it into the worker's record, if there is one.
 
     Args:
         start: first point.
         end: last point.
-        bow: bend of a straight path in [-1, 1].
-        discs: temporary obstacles (n, 3), x, y, radius [m]; they are shrunk to leave the ends free.
+        bow: lateral bow of a straight path, in [-1, 1].
+        discs: temporary obstacles (n, 3): x, y, radius [m]; they are shrunk to leave the ends free.
         grid: slack on the floor.
-        worker: record that the path is written into.
+        worker: record into which the path is written.
 
     Returns:
         Whether there is a path.
@@ -131,7 +131,7 @@ def find_route(
 
 @kernel
 def is_path_free(ground: Ground, worker: Worker) -> bool:
-    """Return whether the path that is laid is free."""
+    """Return whether the worker's path is free."""
     n = int(worker.length / SAMPLE_M) + 1
     for k in range(n + 1):
         x, y = locate_on_path(k / n * worker.length, worker)
@@ -142,7 +142,7 @@ def is_path_free(ground: Ground, worker: Worker) -> bool:
 
 @kernel(makes_arrays=True)
 def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
-    """Find a short path by A*, and write its corners.
+    """Find a short path by A* and write its corners.
 
     Args:
         start: first point.
@@ -151,7 +151,7 @@ def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
         via: corners (`MAX_VIA`, 3), of which the first two columns are written.
 
     Returns:
-        The number of corners; -1 if there is no path, or none with so few corners.
+        The number of corners; -1 if there is no path, or it has more than `MAX_VIA` corners.
     """
     h, slack, origin = STRIDE * CELL_M, ground.grid.slack, ground.grid.origin
     n_x = (slack.shape[0] + STRIDE - 1) // STRIDE
@@ -195,7 +195,7 @@ def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
 def _pull_tight(
     goal: int, parent: Ints, n_y: int, start: Point, end: Point, ground: Ground, via: Floats
 ) -> int:
-    """Reduce a chain of nodes, from its end to its start, to the corners that are needed.
+    """Reduce a chain of nodes, from its end to its start, to the necessary corners.
 
     Args:
         goal: last node of the chain.

@@ -1,4 +1,4 @@
-"""Rows of declared records whose fields are attributes in Python, as they are in kernels."""
+"""Rows of declared records with fields as attributes in Python, as in compiled kernels."""
 
 from collections.abc import Callable
 from operator import itemgetter
@@ -13,9 +13,9 @@ RowType = TypeVar("RowType", bound=type[np.void])
 
 
 def with_fields(declaration: type) -> Callable[[RowType], RowType]:
-    """Return a decorator that gives a type of rows an attribute for each field of a declaration.
+    """Return a class decorator that adds an attribute for each field of a declaration.
 
-    An attribute takes a third of the time of `numpy.record`'s.
+    Access to such an attribute takes a third of the time of `numpy.record`.
     """
 
     def add_fields(row: RowType) -> RowType:

@@ -1,19 +1,19 @@
-"""The order of the workers' activities: a small graph of jobs at kinds of workplaces."""
+"""Order of the workers' activities: a graph of jobs at kinds of workplaces."""
 
 import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.motion.state import ACTIVITY_NAMES, WAYS
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 HERE = "here"
-"""Kind of place of a job that is done wherever the worker is."""
+"""Value of `Job.at` for a job that is done at the worker's current location."""
 ROUTES = ("walk", "push")
-"""Ways to go to a job."""
+"""Values of `Job.by`, the way to go to the place of a job."""
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
 """Activities that a job can have."""
 HIGHEST_M = 2.2
@@ -22,31 +22,29 @@ HIGHEST_M = 2.2
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One thing to do, and the jobs that may follow; weights are shares of their sum."""
+    """A unit of work and the jobs that may follow; weights are relative to their sum."""
 
     name: str
-    """Name of the job, which other jobs refer to."""
+    """Name of the job, by which other jobs refer to it."""
     activity: str
     """Name of the activity, one of `DONE_THERE`."""
     at: str
     """Kind of the workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
-    """Jobs that may follow, with weights; without any the errand ends."""
+    """Jobs that may follow, with weights; the errand ends if there are none."""
     begins: float = 0.0
     """Weight with which an errand begins with this job; 0 for never."""
     prop: str = "nothing"
-    """Prop that is picked up, used, or pushed on the way.
+    """Prop that is picked up or used, or pushed on the way.
 
-    A job that workers walk to is done where its prop lies at places of its kind, as long as there
-    is any.
+    If workers walk to the job, they do it where such a prop rests at a place of the kind `at`.
     """
     by: str = "walk"
-    """Way to go there: "walk", or "push" the prop."""
+    """Way to go to the place: "walk", or "push" the prop."""
     height_m: float = 0.0
-    """Height of the work above the floor [m]; 0 for the height of the place."""
+    """Height of the work above the floor [m]; 0 for the workplace's height."""
     waits: bool = False
-    """Whether the job waits for the task's signal, while the job before it is repeated.
-    """
+    """Whether the job waits for the task's signal; until then the job before it is repeated."""
 
 
 JOBS: tuple[Job, ...] = (
@@ -140,7 +138,7 @@ JOBS: tuple[Job, ...] = (
     Job("do something", "reach", "open", (("stand about", 0.5), ("do something", 0.5)), 0.4),
     Job("look about", "look round", HERE),
 )
-"""Default jobs: framing work beside a robot that holds the workpiece; judgement."""
+"""Default jobs: wood framing beside a robot that holds the workpiece; judgement."""
 
 _LOW = tuple(
     Job(name, activity, "robot", ((JOBS[0].name, 1.0),), height_m=height_m)
@@ -152,19 +150,19 @@ _LOW = tuple(
         ("lift what lies there", "lift", 0.0),
     )
 )
-"""Jobs at knee height or lower: kneeling, on the haunches, bent."""
+"""Jobs at knee height or lower, done kneeling, squatting or bent over."""
 _BOARD = (
     Job("wait for the board", "stand", "robot", (("screw the board on", 1.0),)),
     Job("screw the board on", "screw", "task", (("step aside", 1.0),), waits=True),
     Job("step aside", "look round", "robot", (("step aside", 1.0),)),
 )
-"""Jobs of helping to fix a board: `HRCDrywall-v0`."""
+"""Jobs of `HRCDrywall-v0`: helping the robot to fix a board."""
 _TOOL = (
     Job("wait for the tool", "stand", "robot", (("take the tool", 1.0),)),
     Job("take the tool", "take", "task", (("go on", 1.0),), waits=True),
     Job("go on", "look round", "robot", (("go on", 1.0),)),
 )
-"""Jobs of receiving a tool: `HRCHandover-v0`."""
+"""Jobs of `HRCHandover-v0`: receiving a tool from the robot."""
 _STACK = (
     Job("look at the work", "look round", "robot", (("take from the stack", 1.0),)),
     Job("take from the stack", "pick up", "task", (("lay it down", 1.0),), 1.0, "stud"),
@@ -175,7 +173,7 @@ _STACK = (
         (("take from the stack", 0.9), ("look at the work", 0.1)),
     ),
 )
-"""Jobs of taking from the robot's stack: `HRCPickPlace-v0`."""
+"""Jobs of `HRCPickPlace-v0`: taking parts from the robot's stack."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
@@ -187,15 +185,15 @@ WORK: dict[str, tuple[Job, ...]] = {
     "handover": _TOOL,
     "stack": _STACK,
 }
-"""Named choices of jobs.
+"""Presets of jobs by name.
 
-"framing" keeps workers upright at the robot, "low_work" also has jobs at its foot (judgement); the
-others belong to tasks in which workers take part.
+In "framing", workers stand upright at the robot; "low_work" adds jobs at its foot (judgement). The
+others belong to tasks in which workers participate.
 """
 
 
 def check_jobs(jobs: Sequence[Job]) -> None:
-    """Refuse unknown names, numbers out of bounds, and jobs of which none is at the robot."""
+    """Raise `ConfigError` for unknown names, numbers out of bounds, or no job at the robot."""
     names = [job.name for job in jobs]
     if len(set(names)) < len(names):
         raise ConfigError(f"Jobs must have different names, got {names}.")
@@ -210,7 +208,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
             *(("job after", name, names) for name, _ in job.then),
         ):
             if got not in valid:
-                raise unknown(f"{noun} {job.name!r}", got, valid)
+                raise make_unknown_name_error(f"{noun} {job.name!r}", got, valid)
         if not 0.0 <= job.height_m <= HIGHEST_M:
             raise ConfigError(
                 f"{job.name!r}: height_m must be 0 to {HIGHEST_M} m, got {job.height_m}."
@@ -223,30 +221,30 @@ def check_jobs(jobs: Sequence[Job]) -> None:
 
 
 class Choice(NamedTuple):
-    """A job that may be next."""
+    """A job that may come next."""
 
     job: int
     """Index into the schedule's jobs."""
     share: float
-    """Weight of the job; in a `Schedule`, cumulative share up to 1."""
+    """Weight of the job; in a `Schedule`, the cumulative share up to 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """The graph of the jobs that a scene has places for."""
+    """Graph of the jobs for which a scene has places."""
 
     jobs: tuple[Job, ...]
-    """The jobs."""
+    """Jobs for which there are places."""
     then: tuple[tuple[Choice, ...], ...]
-    """For each job the jobs that may follow."""
+    """Jobs that may follow each job."""
     robot: int
     """Index of the first job at the robot."""
     begins: tuple[Choice, ...]
-    """Jobs with which errands elsewhere begin; empty where there is nowhere else."""
+    """Jobs with which errands away from the robot begin; empty if there are none."""
 
 
 def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
-    """Return the jobs that can be done at some kinds of places; those at the robot always are."""
+    """Return the graph of the jobs at given kinds of places; jobs at the robot are always kept."""
     kept = tuple(job for job in jobs if job.at in (*kinds, "robot", HERE))
     index = {job.name: k for k, job in enumerate(kept)}
     then = tuple(
@@ -259,12 +257,12 @@ def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
 
 
 def _accumulate(weights: list[Choice]) -> tuple[Choice, ...]:
-    """Return weights of jobs as cumulative shares of their sum."""
+    """Convert weights of jobs to cumulative shares of their sum."""
     total = sum(weight for _, weight in weights)
     running = itertools.accumulate(weight / total for _, weight in weights)
     return tuple(Choice(k, share) for (k, _), share in zip(weights, running, strict=True))
 
 
 def pick_job(choices: tuple[Choice, ...], draw: float) -> int:
-    """Return the job that a uniform draw in [0, 1) falls on; the choice is not empty."""
+    """Return the job selected by a uniform draw in [0, 1); `choices` must not be empty."""
     return next((job for job, share in choices if draw < share), choices[-1].job)

@@ -1,4 +1,4 @@
-"""Setting out: to a place by a path clear of other workers, a few steps back, into a clip."""
+"""Start of motion: walks to a place clear of other workers, steps back, and clips."""
 
 import math
 from collections.abc import Iterable
@@ -33,21 +33,21 @@ from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 WANTS_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
-"""Draws of an activity: whether to play a clip instead of it, and which."""
+"""Indices of the draws that decide whether to play a clip instead of an activity, and which."""
 FALLS, RUNS, HOW_FAST, HOW_LONG, STAYS_DOWN = range(8, 13)
-"""Draws of a walk: whether to fall or run, how fast, how long to lie, whether to stay down."""
+"""Indices of a walk's draws: whether to fall or run, speed, time to lie, whether to stay down."""
 ARRIVED_M = 0.12
 """Distance to a place within which a worker has arrived [m]."""
 HURRY = (1.0, 0.75)
-"""Shares of the walking speed that are tried in turn."""
+"""Factors of the walking speed that are tried in turn."""
 STAY_DOWN_S = (15.0, 40.0)
-"""Time on the floor without getting up soon [s]; judgement."""
+"""Range of the time on the floor of a worker that stays down [s]; judgement."""
 STUMBLE_TO = ("robot", "open", "floor")
-"""Kinds of places with room ahead for the arms of a stumbling worker."""
+"""Kinds of places that have room ahead for the arms of a stumbling worker."""
 
 
 class Action(NamedTuple):
-    """An activity that begins."""
+    """An activity that begins, with its duration."""
 
     activity: int
     """Index into `ACTIVITY_NAMES`."""
@@ -56,7 +56,7 @@ class Action(NamedTuple):
 
 
 def set_out(decision: Decision) -> Action | None:
-    """Begin to walk to a place of the job, if there are a free one and a free path to it."""
+    """Begin to walk to a place of the job, if a place and a path to it are free."""
     job, worker = decision.job, decision.worker
     if worker.travel == UNDER_WAY and worker.place_kind == ON_STAGE:
         place = Place(*worker.place.tolist())
@@ -69,12 +69,12 @@ def set_out(decision: Decision) -> Action | None:
 
 
 def _set_out_to(decision: Decision, places: Iterable[Place], kind: int) -> Action | None:
-    """Begin to walk to one of some places.
+    """Begin to walk to the first place with a free path.
 
     Args:
         decision: inputs of the decision.
         places: places in the order in which they are tried.
-        kind: their kind, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
+        kind: kind of the places, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
     """
     mind, worker = decision.mind, decision.worker
     for place in places:
@@ -102,14 +102,14 @@ def _set_out_to(decision: Decision, places: Iterable[Place], kind: int) -> Actio
 def _plan_way(
     decision: Decision, place: Place, obstacles: Floats, share: float, to_work: bool
 ) -> Action | None:
-    """Plan to go to a place, if there is a path.
+    """Plan to go to a place; return None if there is no path.
 
     Args:
         decision: inputs of the decision.
-        place: the place.
-        obstacles: discs (n, 3) that the path goes around: x, y, radius [m].
-        share: share of the worker's walking speed.
-        to_work: whether there is a job to be done at the place.
+        place: goal of the path.
+        obstacles: discs (n, 3) that the path must avoid: x, y, radius [m].
+        share: factor of the worker's walking speed.
+        to_work: whether the worker has a job to do at the place.
     """
     mind, job, worker = decision.mind, decision.job, decision.worker
     start = Point(float(worker.start_x), float(worker.start_y))
@@ -134,14 +134,14 @@ def _plan_way(
 
 
 def _has_wheels(decision: Decision) -> bool:
-    """Return whether the cart to be pushed is within reach, or none lies about."""
+    """Return whether the cart to be pushed is within reach, or the scene has no such cart."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     return row >= 0 or not lying.has_load(decision.loads, kind)
 
 
 def _take_wheels(decision: Decision) -> None:
-    """Take the cart that is pushed from the loads that lie about."""
+    """Remove the cart that the worker will push from the loads at rest."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     if row >= 0:
@@ -149,7 +149,7 @@ def _take_wheels(decision: Decision) -> None:
 
 
 def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Action | None:
-    """Plan to fall on the way or to run it, if that is drawn and there is room."""
+    """Plan to fall on the way or to run, if this is drawn and there is room."""
     people, grid = decision.mind.config.people, decision.mind.plan.grid
     worker, draws = decision.worker, decision.draws
     if draws[FALLS] < people.fall_probability:
@@ -166,7 +166,7 @@ def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Ac
 
 
 def step_back(decision: Decision) -> Action | None:
-    """Begin to step back, if there is room behind."""
+    """Begin to step back, if there is room behind the worker."""
     if decision.is_loaded:
         return None
     plan, worker = decision.mind.plan, decision.worker
@@ -181,7 +181,7 @@ def step_back(decision: Decision) -> Action | None:
 
 
 def cancel_plan(decision: Decision) -> None:
-    """Cancel the plan: the worker ends where they stand, with the load that they hold."""
+    """Cancel the plan: the worker stays at the current pose and keeps any load in the hands."""
     worker = decision.worker
     worker.end_x, worker.end_y, worker.end_yaw = worker.start_x, worker.start_y, worker.start_yaw
     worker.step_count, worker.load_prop = 0, decision.held_prop
@@ -189,7 +189,7 @@ def cancel_plan(decision: Decision) -> None:
 
 
 def has_arrived(decision: Decision) -> bool:
-    """Return whether the worker stands at their place."""
+    """Return whether the worker stands at the place of the errand."""
     worker, (x, y, yaw, _) = decision.worker, decision.worker.place.tolist()
     off, turned = math.hypot(worker.start_x - x, worker.start_y - y), worker.start_yaw - yaw
     if PROP_NAMES.index(decision.job.prop) in lying.WHEELED and decision.job.by == "walk":
@@ -198,7 +198,7 @@ def has_arrived(decision: Decision) -> bool:
 
 
 def check_traffic(decision: Decision, action: Action) -> Meeting:
-    """Return when and where an action that the worker begins now comes too close to another's."""
+    """Return when and where an action, if it begins now, comes too close to another worker."""
     if len(decision.workers) == 1:
         return Meeting(-1.0, 0.0, 0.0)
     worker = decision.worker
@@ -207,9 +207,9 @@ def check_traffic(decision: Decision, action: Action) -> Meeting:
 
 
 def begin_clip(decision: Decision) -> Action | None:
-    """Begin to play a clip if one is drawn, or to go where there is room for it.
+    """Begin to play a clip if one is drawn, or to go to a place with room for it.
 
-    The next clip follows a clip, if there is room.
+    After a piece of a clip, the next piece follows if there is room.
     """
     mind, worker, n_clips = decision.mind, decision.worker, len(decision.mind.clips.count)
     was_clip = worker.activity == st.CLIP
@@ -240,7 +240,7 @@ def _begin_clip_here(decision: Decision, piece: int) -> Action | None:
         room = min(read_slack(x, y, mind.plan.grid) for x, y in roots)
         if room >= 0.0 and check_traffic(decision, action).time_s < 0.0:
             if decision.kind_here:
-                decision.set_travel(UNDER_WAY)  # that is, back to the place afterwards
+                decision.set_travel(UNDER_WAY)  # so that the worker returns to the place afterwards
             else:
                 decision.set_travel(THERE)
                 worker.place[:] = worker.end_x, worker.end_y, worker.end_yaw, 0.0

@@ -1,4 +1,4 @@
-"""Starting an activity by its number, with the start function of its kind (`activities`)."""
+"""Start of activities by index, with the start functions of `activities`."""
 
 import math
 from collections.abc import Callable
@@ -23,19 +23,19 @@ from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.props import PROP_NAMES
 
 TAKE_M = 0.52
-"""Distance ahead at which a hand is held out for a tool that is brought [m]."""
+"""Distance ahead of the root at which a hand is held out for an offered tool [m]."""
 TAKE_S = 0.8
-"""Time that the hand holds the tool there [s]."""
+"""Time for which the hand is held out [s]."""
 BODY_M = 0.36
-"""Least distance of hands from their own root [m]."""
+"""Least distance of the hands from the worker's root [m]."""
 OWN_SIDE_M = 0.30
-"""Least distance of hands from the middle to another worker [m]."""
+"""Least distance of the hands from the midline between two workers [m]."""
 
 
 def start_going(
     activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, worker: Worker
 ) -> float:
-    """Start to walk, carry, push or stumble along the path that is laid.
+    """Plan to walk, carry, push or stumble along the worker's path.
 
     Args:
         activity: index into `ACTIVITY_NAMES`.
@@ -57,12 +57,12 @@ def start_going(
 
 @kernel
 def start_take(draws: Floats, height: float, worker: Worker) -> float:
-    """Hold out a hand for a tool that is brought, and hold it there.
+    """Plan to hold out a hand for a tool that the robot offers.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the hand [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -79,7 +79,10 @@ def start_take(draws: Floats, height: float, worker: Worker) -> float:
 
 
 Start = Callable[[Floats, float, Worker], float]
-"""Begins an activity from draws (N_START,) in [0, 1) and a height [m]; returns its duration [s]."""
+"""Function that plans an activity from draws (N_START,) in [0, 1), a height [m] and a worker.
+
+It writes the plan into the worker's record and returns the duration [s].
+"""
 
 
 def _finish_work(plan: Start) -> Start:
@@ -88,7 +91,7 @@ def _finish_work(plan: Start) -> Start:
 
 
 def _finish_load(plan: Start) -> Start:
-    """Return a start function that plans and finishes the lift of a load."""
+    """Return a start function that plans and finishes the handling of a load."""
     return lambda draws, height, worker: loads.finish_lift(plan(draws, height, worker), worker)
 
 
@@ -111,13 +114,13 @@ STARTS: dict[int, Start] = {
     st.SCREW: _finish_work(wp.plan_screw),
     st.TAKE: start_take,
 }
-"""Start functions of activities on the spot; each is compiled when it is first needed."""
+"""Start functions of activities on the spot, by activity; each is compiled at first use."""
 
 
 def start_here(
     decision: Decision, activity: int, height: float, at_rest: Floats | None = None
 ) -> float:
-    """Start an activity where the worker stands.
+    """Plan an activity at the worker's current pose.
 
     Args:
         decision: inputs of the decision.
@@ -146,7 +149,7 @@ def start_here(
 
 
 def _start_load(decision: Decision, activity: int, at_rest: Floats) -> float:
-    """Start to pick up a load from its pose at rest, or to lay it down there."""
+    """Plan to pick up a load from its rest pose, or to lay it down at this pose."""
     draws, worker = decision.draws, decision.worker
     if activity == st.PICK_UP:
         prop, on_shoulder = PROP_NAMES.index(decision.job.prop), bool(draws[8] < 0.5)
@@ -159,7 +162,7 @@ def _start_load(decision: Decision, activity: int, at_rest: Floats) -> float:
 
 @kernel
 def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Point:
-    """Move a target to the worker's own side of the middle to every other worker.
+    """Move a target to the worker's side of the midline to every other worker.
 
     Args:
         x: world x of the target [m].
@@ -183,12 +186,12 @@ def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Poin
 def _draw_target(
     draws: Floats, params: HandParams, near: bool, height: float, worker: Worker
 ) -> Vector3:
-    """Draw a target of the hands in the world [m].
+    """Draw a random target of the hands, in the world [m].
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         params: settings of reaches.
-        near: whether the target is in the robot's workspace, else it is ahead of the worker.
+        near: whether the target is in the robot's workspace instead of ahead of the worker.
         height: least height of a target ahead [m].
         worker: record of the worker.
     """
@@ -210,15 +213,15 @@ def _draw_target(
 def start_reach(
     draws: Floats, params: HandParams, near: bool, height: float, others: Floats, worker: Worker
 ) -> float:
-    """Draw a reach: its target, hands, speed and duration.
+    """Plan a random reach: its target, hands, speed and duration.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         params: settings of reaches.
-        near: whether the target is in the robot's workspace, else it is ahead of the worker.
+        near: whether the target is in the robot's workspace instead of ahead of the worker.
         height: least height of a target ahead [m].
         others: places (n, 2) of the other workers [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -241,12 +244,12 @@ def start_reach(
 
 @kernel
 def start_lift(draws: Floats, params: HandParams, worker: Worker) -> float:
-    """Draw a lift: where the load stands, and the times to bend, raise and hold.
+    """Plan a random lift: the load's position, and the times to bend, raise and hold.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         params: settings of lifts.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

@@ -1,4 +1,4 @@
-"""How episodes begin: with the robots away from people."""
+"""Initial states of episodes, with the robots away from people."""
 
 from collections.abc import Callable, Mapping
 
@@ -13,9 +13,9 @@ from hrc_env.motion import generator
 from hrc_env.worker.body import Body, worker_truth
 
 APART_M = 0.10
-"""Least distance of a robot's start from a worker's true surface [m]."""
+"""Least distance of a robot's initial pose from a worker's true surface [m]."""
 ROBOT_TRIES, TRIES = 8, 40
-"""Number of draws of a robot's start before the workers are drawn again, and of draws in all."""
+"""Number of draws of a robot's start before workers are also redrawn, and of all draws."""
 
 
 def begin_apart(
@@ -29,23 +29,23 @@ def begin_apart(
 ) -> JointAngles:
     """Begin episodes in which the robots start away from the workers.
 
-    The start of a robot that is too close to a worker is drawn again, and after a while the workers
-    are.
+    A robot's start that is too close to a worker is drawn again; after `ROBOT_TRIES` draws, the
+    workers are drawn again, too.
 
     Args:
         ids: environments (N,).
-        draw: returns a start for each of some environments [rad].
-        motion: state of the workers, which begins anew.
+        draw: function that returns initial joint angles for given environments [rad].
+        motion: state of the workers, which is reset.
         rngs: generators of the workers, one for each environment of the batch.
-        chain: the robot.
+        chain: kinematic chain of the robot.
         bodies: bodies of the workers.
-        casts: by environment, what of the workers is not drawn.
+        casts: prescribed workers and activities, by environment.
 
     Returns:
         Joint angles (N, n_joints) at which the robots start [rad].
 
     Raises:
-        ConfigError: all draws were too close.
+        ConfigError: the robot was too close to a worker in all draws.
     """
     generator.reset(motion, ids, rngs, casts)
     q, near = draw(ids), np.arange(len(ids))
@@ -64,7 +64,7 @@ def begin_apart(
 
 
 def draw_near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngles:
-    """Draw joint angles (len(rngs), N), each within `spread_rad` (N,) of home [rad]."""
+    """Draw joint angles (len(rngs), N) uniformly within `spread_rad` (N,) of home [rad]."""
     angles = [home_q + rng.uniform(-1, 1, len(spread_rad)) * spread_rad for rng in rngs]
     return np.array(angles).reshape(len(rngs), -1)
 
@@ -72,15 +72,15 @@ def draw_near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngle
 def measure_gap_m(
     ids: Ints, q: JointAngles, motion: generator.MotionState, chain: SerialChain, bodies: Body
 ) -> Floats:
-    """Return the true distance (N,) of robots from the nearest of their workers [m].
+    """Return the true distance (N,) of each robot from the nearest worker [m].
 
-    It is infinite without any worker.
+    It is infinite if there is no worker.
 
     Args:
         ids: environments (N,).
-        q: joint angles (N, n_joints) of their robots [rad].
+        q: joint angles (N, n_joints) of the robots [rad].
         motion: state of the workers.
-        chain: the robot.
+        chain: kinematic chain of the robot.
         bodies: bodies of the workers.
     """
     truth = worker_truth(bodies, generator.current(motion, ids))

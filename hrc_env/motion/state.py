@@ -18,21 +18,21 @@ from hrc_env.worker.body import N_SEGMENTS
 MAX_VIA = 8
 """Greatest number of corners of a path."""
 MAX_STEPS = 72
-"""Greatest number of steps of one walk: 30 m at 0.8 m/s and the turns at its ends."""
+"""Greatest number of steps of one walk: 30 m at 0.8 m/s with turns at both ends."""
 N_ROOTS = 48
-"""Number of moments at which the root of a clip is stored."""
+"""Number of samples of the root's path that are stored for a clip."""
 N_POINTS = N_SEGMENTS + 4
-"""Rows of points in the kinematics: the segments, then four auxiliary points."""
+"""Number of points in the kinematics: the segments, followed by four auxiliary points."""
 N_FRAMES = N_SEGMENTS + 1
-"""Rows of rotations in the kinematics: the segments, then one auxiliary rotation."""
+"""Number of rotations in the kinematics: the segments, followed by one auxiliary rotation."""
 
 
 class Worker:
     """One simulated worker: body, current activity, the plan of that activity and scratch space.
 
     The fields from `start_x` to `roots` are written when an activity begins (`activities`); the
-    closed form of the activity reads them. Yaw, pitch and roll are turns about z, y and x, applied
-    in that order from the world to the object.
+    closed form of the activity reads them. Yaw, pitch and roll are rotations about z, y and x:
+    world_from_object = Rz(yaw) Ry(pitch) Rx(roll).
     """
 
     # The episode.
@@ -43,19 +43,19 @@ class Worker:
     bones: Annotated[Floats, (N_SEGMENTS, 3)]
     """Origin of each segment in its parent's frame at rest [m]."""
     frame: Annotated[Floats, (N_SEGMENTS, 3, 3)]
-    """Rows bone, hinge x bone and hinge of each limb bone at rest; zero for other segments."""
+    """Axes of each limb bone at rest, as rows bone, hinge x bone, hinge; else zero."""
     lengths: Annotated[Floats, (N_SIZES,)]
-    """Lengths of the body [m]; `anatomy` names the columns."""
+    """Body dimensions [m]; `anatomy` names the columns."""
     trunk_ends: Annotated[Floats, (N_ROUND, 5)]
-    """Ends of the trunk's capsules: segment, position in its frame (3) [m], radius [m]."""
+    """Ends of the trunk's capsules: segment, position (3) in its frame [m], radius [m]."""
     speed_m_s: float
     """Preferred walking speed [m/s]."""
     squat_share: float
-    """Share of squatting, rather than bowing, in a lift."""
+    """Share of squatting, as opposed to bending the trunk, in a lift."""
     right_handed: float
-    """Probability of using the right hand where either would do."""
+    """Probability of using the right hand if either hand is suitable."""
     phases: Annotated[Floats, (5,)]
-    """Phases of the worker's sway, in periods."""
+    """Phases of the worker's postural sway [periods]."""
 
     # The current activity and errand.
     clock_s: float
@@ -67,39 +67,39 @@ class Worker:
     duration_s: float
     """Duration of the activity on its own clock [s]."""
     pace: float
-    """Rate of the activity's clock: 1 as planned, 0 halted, negative while it is undone."""
+    """Rate of the activity's clock: 1 as planned, 0 if halted, negative for reversed motion."""
     wanted_pace: float
-    """Pace that `pace` approaches."""
+    """Target value of `pace`."""
     blend: Annotated[Floats, (c.N_BLENDED, 2)]
-    """Difference to the previous activity at time 0, value and rate, which decays."""
+    """Decaying difference from the previous activity's controls: value and rate at time 0."""
     stance: Annotated[Floats, (2, 5)]
-    """Footprints at the beginning, left and right; columns as in `footprints`."""
+    """Footprints of the left and right foot at the beginning; columns as in `footprints`."""
     footprints: Annotated[Floats, (MAX_STEPS, 5)]
     """Footprint of each step: x, y [m], heading [rad], share of a full stride, height [m]."""
     place: Annotated[Floats, (4,)]
-    """Place of the errand: x, y [m], heading [rad], height of the work [m]."""
+    """Workplace of the errand: x, y [m], heading [rad], height of the work [m]."""
     stay_until_s: float
-    """Clock until which the worker stays at the place [s]."""
+    """Episode time until which the worker stays at the workplace [s]."""
     waiting_since_s: float
-    """Clock since which the worker has been waiting for a free way [s]; 0 if not waiting."""
+    """Episode time since which the worker has waited for a free path [s]; 0 if not waiting."""
     job: int
     """Current job, an index into the schedule's jobs."""
     travel: int
     """Progress of the errand: `THERE`, `UNDER_WAY` or `WAITING`."""
     place_kind: int
-    """Kind of the place, an index into `WORKPLACE_KINDS`, or `NOWHERE` or `ON_STAGE`."""
+    """Kind of the workplace, an index into `WORKPLACE_KINDS`, or `NOWHERE` or `ON_STAGE`."""
 
     # The worker and the robot.
     robot_world: Annotated[Floats, (2, 3)]
-    """Elbow and tool of the robot in the world at the last look [m]; infinite before the first."""
+    """Elbow and tool of the robot when last observed, in the world [m]; initially infinite."""
     reacts_at_s: float
-    """Clock at which the worker will react to the robot [s]; infinite if nothing was noticed."""
+    """Episode time of the worker's next reaction to the robot [s]; infinite if none is due."""
     current_reaction: int
     """Current reaction: `NO_REACTION`, `PAUSE` or `BACK_AWAY`."""
     reaction_until_s: float
-    """Clock at which the current reaction ends [s]."""
+    """Episode time at which the current reaction ends [s]."""
     calm_until_s: float
-    """Clock before which nothing startles the worker [s]."""
+    """Episode time until which the worker does not react again [s]."""
     reaction_delay_s: float
     """Delay of the next reaction [s], drawn when an activity begins."""
     planned_reaction: int
@@ -107,7 +107,7 @@ class Worker:
     reaction_s: float
     """Duration of the next reaction [s], drawn when an activity begins."""
     signal: int
-    """Stage of the task's signal that the worker waits for, see `reactions.follow_signal`."""
+    """Current stage of the task's signal, see `reactions.follow_signal`."""
 
     # The plan of the activity: where it begins and ends, its steps, the load.
     start_x: float
@@ -123,17 +123,17 @@ class Worker:
     end_yaw: float
     """Heading at the end [rad]."""
     step_start: float
-    """Time of the first lift-off [s]."""
+    """Time at which the first foot lifts off [s]."""
     step_period: float
     """Time from one lift-off to the next [s]."""
     step_swing: float
-    """Time that a foot is in the air [s]."""
+    """Duration of a foot's swing [s]."""
     step_first: int
     """Foot of the first step: 0 left, 1 right."""
     step_count: int
     """Number of steps."""
     undo_at: float
-    """Time from which the steps are retraced, the last one first [s]; 0 for never."""
+    """Time from which the steps are retraced in reverse order [s]; 0 for never."""
     total_s: float
     """Duration of an activity with a second half that mirrors the first [s]."""
     load_prop: int
@@ -155,19 +155,19 @@ class Worker:
     path: Annotated[Floats, (2 * MAX_VIA + 1, 6)]
     """Pieces of the path, lines and arcs; `paths` explains the columns."""
     depart: float
-    """Time at which the root sets off [s]."""
+    """Time at which the root starts to move [s]."""
     ramp: float
-    """Time in which the root gathers its top speed, and again loses it [s]."""
+    """Time in which the root accelerates to its top speed, and decelerates from it [s]."""
     travel_s: float
-    """Time that the root moves along the path [s]."""
+    """Duration of the root's motion along the path [s]."""
     top_m_s: float
     """Top speed along the path [m/s]."""
     turn_in: float
-    """Angle of the turn from the first heading into the path [rad]."""
+    """Initial heading relative to the path's direction [rad], which the first turn removes."""
     turn_in_s: float
     """Duration of the turn into the path [s]."""
     turn_out: float
-    """Angle of the turn out of the path into the last heading [rad]."""
+    """Angle of the turn from the path's direction to the final heading [rad]."""
     turn_out_s: float
     """Duration of the turn out of the path [s]."""
     turn_out_at: float
@@ -175,31 +175,31 @@ class Worker:
     follow: float
     """1 to face along the path, 0 to keep the heading and side-step."""
     trip_at: float
-    """Time at which a foot catches [s]."""
+    """Time at which the foot is caught in a stumble or fall [s]."""
     trip: float
     """Severity of the stumble in [0, 1]; 0 for none."""
     flight_s: float
-    """Additional time in the air at the top speed of a run [s]; 0 in a walk."""
+    """Additional swing time at the top speed of a run [s]; 0 for a walk."""
     fall_yaw: float
     """Direction of the fall [rad]."""
     fall_pace: float
     """Rate of the fall relative to `falling.POSES`."""
     lie_s: float
-    """Time that the worker lies on the floor [s]."""
+    """Time for which the worker lies on the floor [s]."""
     lie_roll: float
-    """Turn of the lying trunk about its length [rad]; positive to the left."""
+    """Rotation of the lying trunk about its long axis [rad]; positive to the left."""
     front: int
     """Foot on which the worker gets up first: 0 left, 1 right."""
     fall_x: float
-    """World x between the balls of both feet at the stumble [m]."""
+    """World x of the midpoint between the balls of the feet at the stumble [m]."""
     fall_y: float
-    """World y between the balls of both feet at the stumble [m]."""
+    """World y of the midpoint between the balls of the feet at the stumble [m]."""
     grasp_s: float
-    """Time to take hold of the handles of a cart, and to release them [s]."""
+    """Time to grasp the handles of a cart, and time to release them [s]."""
     tilt: float
     """Tilt of a wheelbarrow while it is pushed [rad]."""
     stoop: float
-    """Lean of the trunk to the handles, as in `posture.lean`."""
+    """Lean of the trunk towards the handles, see `posture.lean`."""
 
     # Reaching, lifting, work in place.
     lean: float
@@ -207,69 +207,69 @@ class Worker:
     twist: float
     """Turn of the trunk at full reach [rad]."""
     squat: float
-    """Share of the lean that the knees take."""
+    """Share of the lean that is achieved by bending the knees."""
     out_at: float
-    """Time at which the hands leave [s]."""
+    """Time at which the hands start to move [s]."""
     out_s: float
-    """Time that the hands take to arrive [s]."""
+    """Time that the hands need to reach their targets [s]."""
     hold_s: float
-    """Time that the hands stay [s]."""
+    """Time for which the hands stay at their targets [s]."""
     back_s: float
-    """Time that the hands take to return [s]."""
+    """Time that the hands need to return [s]."""
     target: Annotated[Floats, (6,)]
     """Targets of the grips of the left and the right hand in the world [m]."""
     hands_used: Annotated[Floats, (2,)]
-    """1 for each hand, left and right, that goes to its target, else 0."""
+    """1 for each hand, left and right, that moves to its target, else 0."""
     gaze_yaw: float
-    """Turn of the head to the work [rad]; left is positive."""
+    """Yaw of the head towards the work [rad]; left is positive."""
     gaze_pitch: float
-    """Pitch of the head to the work [rad]; down is positive."""
+    """Pitch of the head towards the work [rad]; down is positive."""
     gaze: Annotated[Floats, (3,)]
-    """Point in the world that the worker looks at [m]."""
+    """Point in the world at which the worker looks [m]."""
     fidget_m: float
-    """Amplitude of the work that reaching hands do [m]."""
+    """Amplitude of the small movements of hands at the target of a reach [m]."""
     fidget_hz: float
-    """Rate of the work that reaching hands do [Hz]."""
+    """Frequency of the small movements of hands at the target of a reach [Hz]."""
     raised: Annotated[Floats, (6,)]
-    """Grips of the left and the right hand with the load lifted, in the world [m]."""
+    """Grips of the left and the right hand when the load is raised, in the world [m]."""
     raise_s: float
     """Time to raise the load [s]."""
     carry_s: float
-    """Time to hold the load up [s]."""
+    """Time for which the load is held up [s]."""
     settle_s: float
-    """Time to get down to the work [s]."""
+    """Time to lower the body to the work [s]."""
     kneel: float
     """Share of kneeling: 1 on one knee, 0 upright."""
     crouch: float
-    """Share of crouching: 1 on the haunches, 0 upright."""
+    """Share of squatting: 1 in a full squat, 0 upright."""
     ahead: float
-    """Displacement of the root on getting down [m], along the heading."""
+    """Displacement of the root along the heading while the body is lowered [m]."""
     tool: int
-    """Prop of the work, an index into `PROPS`; 0 for empty hands."""
+    """Tool of the work, an index into `PROPS`; 0 for empty hands."""
     side: int
     """Hand that holds the tool: 0 left, 1 right."""
     take_s: float
     """Time to take the tool from the belt [s]."""
     tool_pose: Annotated[Floats, (6,)]
-    """Pose of the tool at work, or of a load that stands: x, y, z [m], yaw, pitch, roll [rad]."""
+    """Pose of the tool at work, or of a load at rest: x, y, z [m], yaw, pitch, roll [rad]."""
     midway: Annotated[Floats, (6,)]
-    """Pose of a load held up before the body: x, y, z [m], yaw, pitch, roll [rad]."""
+    """Pose of a load held up in front of the body: x, y, z [m], yaw, pitch, roll [rad]."""
     shoulder_s: float
-    """Time to bring a load from before the body to where it is carried [s]."""
+    """Time to move a load from in front of the body to the shoulder [s]."""
     is_hidden: bool
-    """Whether the load is another person's until it is gripped, and so is not drawn."""
+    """Whether the load is invisible unless gripped, because another person holds it."""
     stroke: int
     """Kind of stroke, see `strokes`."""
     stroke_m: float
     """Size of a stroke [m]."""
     stroke_hz: float
-    """Rate of the strokes [Hz]."""
+    """Frequency of the strokes [Hz]."""
     burst_s: float
     """Duration of a burst of strokes [s]."""
     wander_m: float
-    """Distance to the left that the work moves to and fro between bursts [m]."""
+    """Distance to the left by which the work moves back and forth between bursts [m]."""
     down_m: float
-    """Distance that the work moves down between bursts [m]."""
+    """Distance by which the work moves down between bursts [m]."""
     treads: float
     """Number of treads to climb."""
     riser_m: float
@@ -277,13 +277,13 @@ class Worker:
     up_s: float
     """Time to climb up [s]."""
     left_rad: float
-    """First turn of the head on looking round [rad]."""
+    """First turn of the head when the worker looks round [rad]."""
     left_s: float
-    """Time at which the head leaves its first turn [s]."""
+    """Time at which the head starts to move from its first to its second turn [s]."""
     right_rad: float
-    """Second turn of the head on looking round [rad]."""
+    """Second turn of the head when the worker looks round [rad]."""
     right_s: float
-    """Time at which the head leaves its second turn [s]."""
+    """Time at which the head starts to return from its second turn [s]."""
 
     # Playing a clip.
     clip_row: int
@@ -295,33 +295,33 @@ class Worker:
     clip_yaw: float
     """Heading at which the clip is played [rad]."""
     clip_s: float
-    """Time that playing the frames takes [s]."""
+    """Duration of playing the frames [s]."""
     roots: Annotated[Floats, (N_ROOTS, 2)]
-    """World x, y of the root over the clip at equal intervals [m], for others to keep clear of."""
+    """World x, y of the root at equal intervals over the clip [m]; other workers avoid it."""
 
     # Scratch space of the kernels.
     q: Annotated[Floats, (c.N_CONTROLS,)]
-    """Control vector of the current moment, see `controls`."""
+    """Current control vector, see `controls`."""
     p: Annotated[Floats, (N_POINTS, 3)]
-    """Origins of the segments in the world [m], then the kinematics' auxiliary points."""
+    """Origins of the segments in the world [m], followed by auxiliary points."""
     r: Annotated[Floats, (N_FRAMES, 3, 3)]
-    """Rotation world_from_segment of each segment, then the kinematics' auxiliary rotation."""
+    """Rotation world_from_segment of each segment, followed by an auxiliary rotation."""
     later_p: Annotated[Floats, (N_POINTS, 3)]
-    """Copy of `p` a moment later [m], for velocities."""
+    """Value of `p` a short time later [m], for velocities."""
     later_r: Annotated[Floats, (N_FRAMES, 3, 3)]
-    """Copy of `r` a moment later, for angular velocities."""
+    """Value of `r` a short time later, for angular velocities."""
     goals: Annotated[Floats, (6,)]
     """Targets of both hands in the world while work is planned [m]."""
     handover: Annotated[Floats, (2, c.N_BLENDED)]
-    """Control vector at the end of an activity, and a moment later."""
+    """Control vector at the end of an activity and a short time later, for blending."""
     fall_share: float
-    """Share of the fallen posture in the pose."""
+    """Weight of the fallen posture in the pose, in [0, 1]."""
     trunk_roll: float
-    """Turn of a fallen trunk about its length [rad]."""
+    """Rotation of a fallen trunk about its long axis [rad]."""
     elbows_out: float
-    """Share by which the elbows of a fallen worker point outwards."""
+    """Degree to which the elbows of a fallen worker point outwards, in [0, 1]."""
     knees_out: float
-    """Share by which the knees of a fallen worker point outwards."""
+    """Degree to which the knees of a fallen worker point outwards, in [0, 1]."""
 
 
 @with_fields(Worker)
@@ -330,7 +330,7 @@ class WorkerRow(np.void):
 
 
 WORKER = np.dtype((WorkerRow, dtype_of(Worker)))
-"""NumPy's type of a `Worker`; its rows have attributes in Python, too."""
+"""NumPy data type of a `Worker`; the fields of its rows are attributes in Python, too."""
 N_START = 16
 """Number of uniform draws that a start function may use."""
 
@@ -369,20 +369,20 @@ ACTIVITY_NAMES = (
     "screw",
     "take",
 )
-"""Name of each activity, by its number."""
+"""Name of each activity, by its index."""
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
-"""Activities with the closed form of a walk."""
+"""Activities that are computed by the closed form of a walk."""
 IDLE = (STAND, LOOK_ROUND)
 """Activities in which a load is merely held."""
 TAKING = (PICK_UP, RECEIVE)
-"""Activities with the closed form of picking up."""
+"""Activities that are computed by the closed form of picking up."""
 GIVING = (SET_DOWN, HAND_OVER)
-"""Activities with the closed form of picking up, backwards in time."""
+"""Activities that are computed by the closed form of picking up, reversed in time."""
 WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
-"""Activities that are not a job to be done at a place."""
+"""Activities that a job cannot have."""
 NOWHERE = -1
-"""Kind of place of a worker without an errand."""
+"""Value of `place_kind` for a worker without an errand."""
 ON_STAGE = -2
-"""Kind of place with room to play a clip."""
+"""Value of `place_kind` for a location with room to play a clip."""
 THERE, UNDER_WAY, WAITING = range(3)
 NO_REACTION, PAUSE, BACK_AWAY = range(3)

@@ -1,4 +1,4 @@
-"""Where workers will be, so that no activity begins in which two workers come too close."""
+"""Prediction of workers' positions, to avoid activities in which two workers come too close."""
 
 import math
 from typing import NamedTuple
@@ -15,22 +15,22 @@ from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import measure_travel
 
 APART_M = 0.80
-"""Least distance between two roots [m]: two half widths of people with arms, and a reserve."""
+"""Least distance between two roots [m]: the width of a person with arms, and a reserve."""
 AHEAD_M = 0.48
-"""Distance of hands and head of a working person ahead of the root [m]."""
+"""Distance of the hands and head of a working person ahead of the root [m]."""
 HANDS_M = 0.76
-"""Least distance of another root from those hands [m]."""
+"""Least distance of another worker's root from the hands of a working person [m]."""
 FALL_APART_M = 1.3
-"""Least distance of another root from the root of a falling worker [m]."""
+"""Least distance of another worker's root from the root of a falling worker [m]."""
 
 
 class HandsClearance(NamedTuple):
-    """A point ahead of a worker that others keep clear of."""
+    """A disc ahead of a worker that other workers avoid."""
 
     ahead: float
-    """Distance of the point ahead of the root [m]; 0 for none."""
+    """Distance of the disc's centre ahead of the root [m]; 0 for no disc."""
     apart: float
-    """Least distance of another root from the point [m]."""
+    """Least distance of another worker's root from the centre [m]."""
 
 
 class Meeting(NamedTuple):
@@ -39,23 +39,23 @@ class Meeting(NamedTuple):
     time_s: float
     """Time from now [s]; -1 for never."""
     x: float
-    """World x of the other root then [m]."""
+    """World x of the other worker's root at that time [m]."""
     y: float
-    """World y of the other root then [m]."""
+    """World y of the other worker's root at that time [m]."""
 
 
 PUSHING = HandsClearance(1.0, 0.95)
-"""Clearance in pushing a cart."""
+"""Clearance of a worker that pushes a cart."""
 PLAYING = HandsClearance(0.01, 1.15)
-"""Clearance in playing a clip: an arm's length more on every side."""
+"""Clearance of a worker that plays a clip, larger by an arm's length on all sides."""
 FALLING = HandsClearance(0.01, FALL_APART_M)
-"""Clearance of a falling worker: head and feet from the pelvis, and half a body."""
+"""Clearance of a falling worker: distance of head and feet from the pelvis, plus half a body."""
 BEHIND_M = 0.40
 """Distance of a kneeling worker's shank behind the root [m]."""
 SHANK_M = 0.66
-"""Least distance of another root from that shank [m]."""
+"""Least distance of another worker's root from a kneeling worker's shank [m]."""
 LOOK_S = 0.12
-"""Step in which meetings are looked for [s]; 0.3 m at a closing speed of 2.8 m/s."""
+"""Time step of the search for meetings [s]; 0.3 m at a closing speed of 2.8 m/s."""
 
 
 @kernel
@@ -66,7 +66,7 @@ def is_on_path(activity: int) -> bool:
 
 @kernel
 def get_hands_clearance(activity: int) -> HandsClearance:
-    """Return the point ahead of a worker in an activity that others keep clear of."""
+    """Return the disc ahead of a worker in an activity that other workers avoid."""
     if activity == st.PUSH:
         return PUSHING
     if activity == st.CLIP:
@@ -80,7 +80,7 @@ def get_hands_clearance(activity: int) -> HandsClearance:
 
 @kernel
 def predict_root(t: float, worker: Worker) -> Point:
-    """Return the root on the floor at time t of a worker's activity, and after its end."""
+    """Predict a worker's root on the floor at time t of the activity, also after its end."""
     if is_on_path(worker.activity):
         return locate_on_path(measure_travel(t - worker.grasp_s, worker), worker)
     if worker.activity == st.CLIP:
@@ -92,7 +92,7 @@ def predict_root(t: float, worker: Worker) -> Point:
 
 @kernel
 def measure_gap(x: float, y: float, t: float, worker: Worker) -> float:
-    """Return the distance of a root from a worker beyond the least allowed one [m].
+    """Return the distance of another root from a worker minus the least allowed distance [m].
 
     Args:
         x: world x of the other root [m].
@@ -119,7 +119,7 @@ def measure_gap(x: float, y: float, t: float, worker: Worker) -> float:
 
 @kernel
 def find_meeting(w: int, workers: Records1[Worker]) -> Meeting:
-    """Return when and where worker w first comes too close to another one."""
+    """Predict when and where worker w first comes too close to another worker."""
     time_s, met_x, met_y = -1.0, 0.0, 0.0
     worker = workers[w]
     for k in range(len(workers)):

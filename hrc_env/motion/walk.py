@@ -1,4 +1,4 @@
-"""Walking: along a path, at a speed that rises and falls, with footsteps laid along it.
+"""Walking along a path, with acceleration, deceleration and footsteps.
 
 Cadence and step length follow 68 walking trials of the CMU motion-capture database at 0.8 to 2 m/s:
 cadence = 96.2 v^0.468 steps/min, step length = 0.345 + 0.286 v m.
@@ -31,51 +31,51 @@ CADENCE_PER_MIN = 96.2
 CADENCE_POWER = 0.468
 """Exponent of the speed in the fit above."""
 SLOWEST_M_S = 0.65
-"""Speed below which starts and turns keep the cadence of this speed [m/s]."""
+"""Least speed for the cadence [m/s]; slower starts and turns keep the cadence of this speed."""
 LEG_M = 0.8685772217237624
-"""Leg of a worker with exactly this cadence [m]; others step by the root of their legs' ratio."""
+"""Leg length at which the fit holds [m]; step periods scale with the square root of leg length."""
 SWING_SHARE = 0.80
-"""Time that a foot is in the air as a share of the period of a step, at 1 m/s."""
+"""Swing time as a share of the period of a step, at 1 m/s."""
 SWING_FAST_SHARE = 0.02
 """Increase of `SWING_SHARE` from 1 m/s to `FASTEST_M_S`."""
 FASTEST_M_S = 1.8
 """Speed at which `SWING_FAST_SHARE` is reached [m/s]."""
 MID_STANCE = 0.46
-"""Time after a landing at which the root passes over the footprint, in periods of a step."""
+"""Time from landing until the root passes over the footprint, in periods of a step."""
 EARLIER = 0.31
-"""Time by which runners pass over a footprint earlier than walkers, in periods of a step."""
+"""Time by which runners pass over a footprint before walkers would, in periods of a step."""
 RUN_WIDER_M = 0.015
-"""Increase of half the step width in a run [m], where heels pass the shank higher up; judgement."""
+"""Increase of half the step width in a run [m], so that a heel clears the shank; judgement."""
 WALK_HALF_WIDTH_M = 0.04
-"""Half the step width at full speed [m]; widths of 5 to 9 cm are measured."""
+"""Half the step width at full speed [m]; measured widths are 5 to 9 cm."""
 SHIFT_S = 0.28
 """Time to shift the weight before the first step [s]."""
 TURN_S = 0.5
-"""Duration of a turn by no angle [s]."""
+"""Duration of a turn by an angle of zero [s]."""
 TURN_RATE = 1.7
-"""Rate at which the duration of a turn grows with its angle [rad/s]."""
+"""Angular speed by which the duration of a turn grows with its angle [rad/s]."""
 SIDE_STEP_M = 0.5
-"""Length of a path up to which people take small steps instead of turning [m]; judgement."""
+"""Path length up to which people take small steps instead of turning [m]; judgement."""
 CORNER_M_S2 = 1.6
-"""Greatest sideways acceleration in a corner [m/s^2]; judgement."""
+"""Greatest lateral acceleration in a corner [m/s^2]; judgement."""
 NORMAL_M_S = 1.3
-"""Speed at which the amplitudes below hold [m/s]."""
+"""Speed at which the pace is 1, for which the amplitudes below are stated [m/s]."""
 BOB_M = 0.0095
-"""Half the rise and fall of the pelvis in any walk [m]; 2 to 4 cm in all are measured."""
+"""Amplitude of the pelvis's vertical motion at any pace [m]; measured: 2 to 4 cm peak to peak."""
 BOB_PACE_M = 0.0035
-"""Increase of half the rise and fall with the pace [m]."""
+"""Increase of the amplitude of the pelvis's vertical motion per unit of pace [m]."""
 BENT_M = 0.026
-"""Depth of the pelvis below standing, with the pace [m]; judgement."""
+"""Lowering of the pelvis from its standing height per unit of pace [m]; judgement."""
 BENT_FAST_M = 0.10
-"""Depth of the pelvis below standing, with the square of the hurry [m]; judgement."""
+"""Lowering of the pelvis with the square of the pace above 1 [m]; judgement."""
 SWING_SLOW_RAD = 0.05
-"""Swing of the upper arm to each side at any pace [rad]."""
+"""Amplitude of the upper arm's swing at any pace [rad]."""
 SWING_FAST_RAD = 0.104
-"""Increase of the arm swing with the cube of the pace [rad]."""
+"""Increase of the amplitude of the arm swing with the cube of the pace [rad]."""
 FULL_SWING = 1.1
 """Pace beyond which the arm swing does not grow."""
 ELBOW_SWING = 0.73
-"""Share of the arm swing by which the elbow bends."""
+"""Bend of the elbow as a share of the arm swing."""
 LOADED_TWIST = 0.4
 """Share of the trunk's twist that remains with a load."""
 LURCH_S = 1.4
@@ -83,10 +83,10 @@ LURCH_S = 1.4
 
 
 class Pace(NamedTuple):
-    """How to go along a path."""
+    """Parameters of walking along a path."""
 
     follow: float
-    """1 to face along the path, 0 to keep the heading."""
+    """1 to face along the path, 0 to keep the initial heading."""
     speed_m_s: float
     """Top speed [m/s]."""
     step_s: float
@@ -116,7 +116,7 @@ def measure_speed(t: float, worker: Worker) -> float:
 
 @kernel
 def locate_root(t: float, worker: Worker) -> FloorPose:
-    """Return position and heading of the walker's root at time t; the heading is not wrapped."""
+    """Return the pose of the walker's root at time t; the heading is not wrapped."""
     s = measure_travel(t, worker)
     x, y = locate_on_path(s, worker)
     turning = min_jerk(t / worker.turn_in_s)
@@ -129,7 +129,7 @@ def locate_root(t: float, worker: Worker) -> FloorPose:
 
 @kernel
 def walk(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of a walker, but for the feet.
+    """Write the control vector of a walker, except for the feet.
 
     Args:
         t: time since the walk began [s].
@@ -175,12 +175,12 @@ def walk(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _lurch(t: float, trip: float, worker: Worker) -> None:
-    """Pitch forward and down with the arms out, and come up again.
+    """Add a stumble: the trunk pitches forward and down with the arms out, and recovers.
 
     Args:
-        t: time since a foot caught [s].
+        t: time since the foot was caught [s].
         trip: severity of the stumble in [0, 1].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     scale = worker.lengths[LEG] / LEG_M
@@ -200,11 +200,11 @@ def _lurch(t: float, trip: float, worker: Worker) -> None:
 
 @kernel
 def plan_walk(end_yaw: float, wanted_m_s: float, worker: Worker) -> float:
-    """Plan to walk along the path that is laid.
+    """Plan to walk along the worker's path.
 
     Args:
         end_yaw: heading at the end [rad].
-        wanted_m_s: top speed [m/s], which sharp corners lower.
+        wanted_m_s: desired top speed [m/s]; it is reduced for sharp corners.
         worker: record with the path; the plan is written into it.
 
     Returns:
@@ -219,10 +219,10 @@ def plan_walk(end_yaw: float, wanted_m_s: float, worker: Worker) -> float:
 
 @kernel
 def plan_pace(pace: Pace, end_yaw: float, worker: Worker) -> float:
-    """Plan speed, turns and steps along the path that is laid.
+    """Plan speed, turns and steps along the worker's path.
 
     Args:
-        pace: facing, top speed and period of a step.
+        pace: orientation, top speed and period of a step.
         end_yaw: heading at the end [rad].
         worker: record with the path; the plan is written into it.
 
@@ -243,11 +243,11 @@ def plan_pace(pace: Pace, end_yaw: float, worker: Worker) -> float:
 
 @kernel
 def plan_way(wanted_m_s: float, ramp_s: float, end_yaw: float, worker: Worker) -> None:
-    """Plan the speed along the path that is laid, the turns at its ends and the first foot.
+    """Plan the speed along the worker's path, the turns at its ends and the first foot.
 
     Args:
-        wanted_m_s: top speed [m/s], which a short path lowers.
-        ramp_s: time to gather the top speed [s].
+        wanted_m_s: desired top speed [m/s]; it is reduced for a short path.
+        ramp_s: time to accelerate to the top speed [s].
         end_yaw: heading at the end [rad].
         worker: record with the path; the plan is written into it.
     """
@@ -262,10 +262,10 @@ def plan_way(wanted_m_s: float, ramp_s: float, end_yaw: float, worker: Worker) -
 
 @kernel
 def brake(t: float, worker: Worker) -> float:
-    """Come to a stand on the path as soon as a walker can from time t.
+    """Replan a walk to stop on the path as soon as possible after time t.
 
-    Feet in the air land as planned. Returns the new duration [s]; -1 if the walker is about to
-    arrive and goes on.
+    Feet in the air land as planned. Return the new duration [s], or -1 if the walker is about to
+    arrive and continues.
     """
     t -= worker.grasp_s
     going = max(t - worker.depart, worker.ramp)
@@ -284,7 +284,7 @@ def brake(t: float, worker: Worker) -> float:
 
 @kernel
 def _plan_turns(end_yaw: float, worker: Worker) -> None:
-    """Plan the turns into the path and out of it, and the time at which the root sets off."""
+    """Plan the turns at both ends of the path, and the time at which the root starts to move."""
     first, final = average_heading(0.0, worker), average_heading(worker.length, worker)
     start_yaw = worker.start_yaw
     turn = wrap(start_yaw - first) if worker.follow > 0.0 else 0.0
@@ -301,7 +301,7 @@ def _plan_turns(end_yaw: float, worker: Worker) -> None:
 
 @kernel
 def plan_steps(first: int, worker: Worker) -> float:
-    """Lay footprints from a step on, where the root passes over them at mid-stance.
+    """Plan the footprints from a given step on, so that the root passes over them at mid-stance.
 
     Args:
         first: index of the first step to lay.
@@ -336,7 +336,7 @@ def plan_steps(first: int, worker: Worker) -> float:
 
 @kernel
 def _choose_first_foot(worker: Worker) -> int:
-    """Return the foot (0 left, 1 right) on the side that the walker turns or steps to."""
+    """Return the foot (0 left, 1 right) on the side to which the walker turns or steps."""
     x, y, yaw = locate_root(worker.depart + worker.travel_s, worker)
     dx, dy = x - worker.start_x, y - worker.start_y
     side = -dx * math.sin(worker.start_yaw) + dy * math.cos(worker.start_yaw)
@@ -348,16 +348,16 @@ def _choose_first_foot(worker: Worker) -> int:
 def write_footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, out: Floats, worker: Worker
 ) -> None:
-    """Write x, y, heading and height of a foot, standing with both feet side by side.
+    """Write the footprint (x, y, heading, height) of a foot beside the root.
 
     Args:
         side: 0 left, 1 right.
         x: world x of the root [m].
         y: world y of the root [m].
         yaw: heading [rad].
-        half_width: distance of the ankle from the middle [m].
-        out: footprint (5,), of which column 3 is left as it was.
-        worker: record with the lengths of the body.
+        half_width: lateral distance of the ankle from the root [m].
+        out: footprint (5,), which is written except for column 3.
+        worker: record with the body dimensions.
     """
     sign = 1.0 - 2.0 * side
     out[0], out[1] = move_point(x, y, yaw, worker.lengths[ANKLE_X], sign * half_width)

@@ -1,1 +1,1 @@
-"""Images to `Keypoints` (`detector`), or `Keypoints` without images (`emulator`)."""
+"""Detection of `Keypoints` in images (`detector`), or without images (`emulator`)."""

@@ -1,6 +1,6 @@
-"""Decoding of BlazePose's tensors: people, regions of interest, landmarks.
+"""Decoding of BlazePose's output tensors to people, regions of interest and landmarks.
 
-The numbers are those of the graphs of MediaPipe 0.10.21. Method: Bazarevsky et al., BlazePose:
+The constants are those of the graphs of MediaPipe 0.10.21. Method: Bazarevsky et al., BlazePose:
 On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
 """
 
@@ -20,11 +20,11 @@ from hrc_env.core.typing import Floats, Image, Points2, Tensor
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, load_landmarker
 
 MIN_SCORE = 0.5
-"""Least detector score and person flag of a person, as in MediaPipe."""
+"""Minimum detector score and presence score of a person, as in MediaPipe."""
 MAX_OVERLAP = 0.3
-"""Overlap (intersection over union) beyond which two boxes are of one person."""
+"""Overlap (intersection over union) above which two boxes belong to the same person."""
 ROI_MARGIN = 1.25
-"""Ratio of the region of interest to the circle around the person."""
+"""Ratio of the side of the region of interest to the diameter of the circle around the person."""
 _REACH = 4  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
 _HEAT_SIDE = 64
 _N_USED = 35  # 33 body landmarks, then the two that give the next region of interest
@@ -32,29 +32,33 @@ _N_USED = 35  # 33 body landmarks, then the two that give the next region of int
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person that the detector stage finds, in units of the square image's side."""
+    """A person found by the detector stage, in units of the square image's side."""
 
     score: float
     """Confidence in [0, 1]."""
     box: Floats
-    """(4,) left, top, right and bottom of the face."""
+    """(4,) left, top, right and bottom edges of the face's bounding box."""
     hip: Points2
     """(2,) midpoint of the hips."""
     rim: Points2
-    """(2,) point on the circle around the whole body, upright above the hips."""
+    """(2,) point on the circle around the whole body; from the hips, it is in the direction of the
+    head of an upright body."""
 
 
 class DetectorInput(NamedTuple):
-    """An image as the detector stage takes it."""
+    """An input of the detector stage."""
 
     image: Tensor
-    """(224, 224, 3) in [-1, 1], with a black border where the image is not square."""
+    """(224, 224, 3) image in [-1, 1], with a black border if the original is not square."""
     window: Roi
-    """The part of the original image that it covers [px]."""
+    """Window of the original image that `image` covers [px]."""
 
 
 def _anchors() -> Floats:
-    """Return the centres (2254, 2) of the detector's cells: strides 8, 16, 32 with 2, 2, 6 each."""
+    """Return the centres (2254, 2) of the detector's cells, with strides 8, 16 and 32.
+
+    A grid point of these strides has 2, 2 and 6 cells.
+    """
     parts = []
     for stride, per_cell in ((8, 2), (16, 2), (32, 6)):
         n = DETECTOR_SIDE // stride
@@ -69,12 +73,12 @@ ANCHORS: Floats = _anchors()
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """Return the same direction in [-pi, pi) [rad]."""
+    """Return the equivalent angle in [-pi, pi) [rad]."""
     return angle_rad - 2 * math.pi * math.floor((angle_rad + math.pi) / (2 * math.pi))
 
 
 def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
-    """Return the region of interest around mid-hip (2,), upright towards the rim (2,) [px]."""
+    """Return the region of interest around mid-hip (2,), with its top towards the rim (2,) [px]."""
     dx, dy = rim_px[0] - centre_px[0], rim_px[1] - centre_px[1]
     side_px = 2 * math.hypot(dx, dy) * ROI_MARGIN
     rotation = wrap_angle(math.pi / 2 - math.atan2(-dy, dx))
@@ -82,18 +86,18 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
 
 
 def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
-    """Return a window of an image as an upright picture, as MediaPipe does.
+    """Resample a window of an image to an upright crop, as MediaPipe does.
 
     Args:
-        image: (H, W, 3) RGB of uint8; outside of it, its border is continued.
-        window: a turned square of the image [px].
-        side: side of the picture [px].
+        image: (H, W, 3) RGB of uint8; outside the image, its border pixels are repeated.
+        window: a rotated square in the image [px].
+        side: side of the crop [px].
 
     Returns:
-        (side, side, 3) of uint8, interpolated bilinearly, corner to corner.
+        (side, side, 3) crop of uint8, interpolated bilinearly; its corners are those of the window.
 
     Raises:
-        ConfigError: the image is not of uint8.
+        ConfigError: the image is not of type uint8.
     """
     if image.dtype != np.uint8:
         raise ConfigError(
@@ -107,7 +111,7 @@ def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
 
 
 def to_image(points: Points2, window: Roi) -> Points2:
-    """Return the image pixels of points (..., 2) in units of the window's side, from its corner."""
+    """Convert points (..., 2) to image pixels from units of a window's side, from its corner."""
     matrix = image_from_crop(window, 1)
     return points @ matrix[:, :2].T + matrix[:, 2]
 
@@ -121,7 +125,7 @@ def image_from_crop(window: Roi, side: int) -> Floats:
 
 
 def detector_input(image: Image) -> DetectorInput:
-    """Return an image of any shape as the detector stage takes it."""
+    """Convert an image of any shape to an input of the detector stage."""
     height, width = image.shape[:2]
     window = Roi((width / 2, height / 2), float(max(height, width)), 0.0)
     size = (DETECTOR_SIDE, DETECTOR_SIDE)
@@ -131,17 +135,17 @@ def detector_input(image: Image) -> DetectorInput:
 
 
 def landmark_input(crop: Image) -> Tensor:
-    """Return a crop (256, 256, 3) as the landmark stage takes it, in [0, 1]."""
+    """Convert a crop (256, 256, 3) to an input of the landmark stage, in [0, 1]."""
     return np.multiply(crop, np.float32(1 / 255), dtype=np.float32)
 
 
 def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -> list[Person]:
-    """Return the people that the detector stage finds, best first.
+    """Decode the outputs of the detector stage to people, in descending order of score.
 
     Args:
         boxes: (2254, 12) box and keypoints of each cell.
         logits: (2254,) logits of the scores.
-        min_score: least score of a person.
+        min_score: minimum score of a person.
     """
     score = 1 / (1 + np.exp(-np.clip(logits.astype(float), -80, 80)))
     kept = np.flatnonzero(score >= min_score)
@@ -153,10 +157,10 @@ def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -
 
 
 def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
-    """Return the people of overlapping boxes, by weighted non-maximum suppression.
+    """Merge overlapping boxes to people, by weighted non-maximum suppression.
 
     Args:
-        score: (n,) scores, the weights.
+        score: (n,) scores, which are the weights.
         box: (n, 4) boxes.
         keypoints: (n, 2, 2) mid-hips and rims.
     """
@@ -164,7 +168,7 @@ def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
     order = np.argsort(-score, kind="stable")
     while len(order):
         same = _overlap(box[order[0]], box[order]) > MAX_OVERLAP
-        same[0] = True  # even a box without area is itself
+        same[0] = True  # a box without area does not overlap even itself
         group = order[same]
         weight = score[group] / score[group].sum()
         hip, rim = np.einsum("n,nkd->kd", weight, keypoints[group])
@@ -174,21 +178,22 @@ def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
 
 
 def person_window(person: Person, window: Roi) -> Roi:
-    """Return the region of interest of a person that was found in a square window [px]."""
+    """Return the region of interest around a person that was found in a square window [px]."""
     hip, rim = to_image(np.array([person.hip, person.rim]), window)
     return window_from_points(hip, rim)
 
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
-    """Return BlazePose's landmarks: 33 of the body, mid-hip and rim.
+    """Decode BlazePose's landmarks: 33 of the body, mid-hip and rim.
 
     Args:
-        points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.
-        heat: (64, 64, 39) logits; where they are high, a point becomes the mean of its
-            neighbourhood with their probabilities as weights.
+        points: (39, 5) x, y, z in crop pixels, and logits of visibility and presence.
+        heat: (64, 64, 39) logits of the heatmaps. If a probability near a point reaches
+            `MIN_SCORE`, the point is refined to the mean of its neighbourhood, weighted with the
+            probabilities.
 
     Returns:
-        (35, 3) x, y in units of the crop's side and visibility in [0, 1].
+        (35, 3) x, y in units of the crop's side, and visibility in [0, 1].
     """
     out = np.empty((_N_USED, 3))
     _refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
@@ -196,14 +201,16 @@ def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
 
 
 def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
-    """Return BlazePose's landmark network as a function that `register_detector` can build on.
+    """Load BlazePose's landmark network as a function on which custom detectors can be based.
+
+    Custom detectors are registered with `register_detector`.
 
     Args:
         network: "lite", "full" or "heavy".
 
     Returns:
         A function from a crop (256, 256, 3), RGB of uint8, to (15, 3): x, y [px] from the crop's
-        corner and confidence in [0, 1] of each of `JOINTS`; None if there is no person.
+        corner and confidence in [0, 1] of each of `JOINTS`. It returns None if there is no person.
 
     Raises:
         WeightsError: the network's weights are missing.
@@ -222,7 +229,7 @@ def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
 
 @kernel
 def _refine(points: Tensor, heat: Tensor, out: Floats) -> None:
-    """Write the result (35, 3) of `decode_landmarks`, without Python's lock."""
+    """Compute the result `out` (35, 3) of `decode_landmarks`, without holding Python's lock."""
     for k in range(out.shape[0]):
         x, y = points[k, 0] / np.float64(LANDMARK_SIDE), points[k, 1] / np.float64(LANDMARK_SIDE)
         out[k, 0], out[k, 1] = x, y
@@ -245,12 +252,12 @@ def _refine(points: Tensor, heat: Tensor, out: Floats) -> None:
 
 @kernel
 def _probability(logit: float) -> float:
-    """Return the probability of a logit."""
+    """Convert a logit to a probability."""
     return 1.0 / (1.0 + math.exp(-min(max(logit, -80.0), 80.0)))
 
 
 def _overlap(box: Floats, boxes: Floats) -> Floats:
-    """Return the intersection over union (n,) of one box (4,) with many (n, 4)."""
+    """Return the intersection over union (n,) of a box (4,) with each of n boxes (n, 4)."""
     low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
     shared = np.clip(high - low, 0, None).prod(1)
     area = (boxes[:, 2:] - boxes[:, :2]).prod(1)

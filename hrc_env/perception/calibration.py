@@ -1,6 +1,6 @@
-"""Parameters of the detector's errors, fitted to renders.
+"""Parameters of the detector's errors, fitted to detections in rendered images.
 
-They are in a small JSON file, which `python -m assets.emulator.calibrate` writes
+They are stored in a JSON file, which is written by `python -m assets.emulator.calibrate`
 (docs/emulator.md).
 """
 
@@ -18,37 +18,37 @@ from hrc_env.core.skeleton import JOINTS, MIRROR
 from hrc_env.core.typing import Floats, Ints
 
 FORMAT, VERSION = "hrc_env keypoints", 7
-"""Format of the file, and the version of its tables; files of other versions are refused."""
+"""Format of the file, and version of its tables; files of other versions are rejected."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
-"""The calibration of the package."""
+"""Path of the calibration that is part of the package."""
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
-"""Kinds of joints; errors of left and right joints are mirror images."""
+"""Kinds of joints; the errors of left and right joints are mirror images."""
 POSTURES = ("standing", "walking", "handling", "folded", "kneeling")
-"""Postures; a body counts as each of them by a share (`outline.Posture`)."""
+"""Names of the postures; a body is a mixture of them (`outline.Posture`)."""
 SIGHTS = ("seen", "hidden", "outside")
-"""How a joint is seen: free, behind something, outside the image."""
+"""Visibility of a joint in an image: seen, occluded, or outside the image."""
 N_VIEWS = 8
-"""Number A of directions from which a body is seen: front, front left, left and so on."""
+"""Number A of viewing directions of a body: front, front left, left and so on."""
 KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
-"""Quantiles that give the distribution of a confidence, in standard deviations."""
+"""Standard normal deviates at which the quantiles of a confidence are given."""
 BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
-"""Quantiles that give the distribution of the factor on the errors of a whole body."""
+"""Standard normal deviates at which the quantiles of the factor on a body's errors are given."""
 N_POSES = 32
-"""Number M of poses that stand for all poses of the data."""
+"""Number M of poses that represent all poses of the data."""
 N_SEEN = len(JOINTS) + 1
-"""Number of possible counts of joints that are seen, from 0 to all."""
+"""Number of possible counts of seen joints, from 0 to all joints."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
 """(V,) reported visibilities at which the standard deviation is given."""
 KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
-"""(J,) kind of every joint."""
+"""(J,) index in `KINDS` of each joint's kind."""
 HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
-"""(J,) -1 for right joints, else 1."""
+"""(J,) -1 for right joints, 1 for all others."""
 INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
-"""(J,) the next joint towards the trunk; itself for those of the trunk."""
+"""(J,) index of the next joint towards the trunk; joints of the trunk have their own index."""
 NEXT: Ints = np.where(np.arange(len(JOINTS)) == INNER, np.minimum(MIRROR, INNER), INNER)
-"""(J,) the next joint towards the trunk; for the trunk's right joints the left one."""
+"""(J,) as `INNER`, but the right joints of the trunk have the index of the left joint."""
 N_POSTURES, N_KINDS, N_SIGHTS = len(POSTURES), len(KINDS), len(SIGHTS)
-"""Numbers P, K and S of postures, kinds of joints and sights."""
+"""Numbers P, K and S of postures, kinds of joints and visibilities of joints."""
 _N_VISIBILITIES = len(VISIBILITY)
 
 
@@ -56,85 +56,88 @@ _N_VISIBILITIES = len(VISIBILITY)
 class Calibration:
     """The parameters of the detector's errors.
 
-    Lengths "of side" are shares of the side of the window around the worker; x is to the right in
-    that window, y down. For right joints x is mirrored. The shapes are annotated (`SHAPES`).
+    Errors in the image are in units of the side of the window around the worker [sides]; x points
+    to the right in that window, and y down. For right joints, x is mirrored. The shapes are
+    annotated (`SHAPES`).
     """
 
     offset_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
-    """(P, K, 3) mean position that the detector reports, from the joint: ahead, to its own side, up
-    [m]."""
+    """(P, K, 3) mean reported position, relative to the true joint: ahead, to the joint's side of
+    the body, up [m]."""
     wander_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
-    """(P, K, 3) standard deviation of that position over time [m]."""
+    """(P, K, 3) standard deviation of the reported position over time [m]."""
     space_limb: Annotated[Floats, (N_KINDS, 3)]
-    """(K, 3) correlation of that position with the one of the `NEXT` joint, axis by axis."""
+    """(K, 3) correlation of the reported position with that of the `NEXT` joint, per axis."""
     between_m: Annotated[Floats, (N_KINDS, 3)]
-    """(K, 3) standard deviation of `offset_m` from body to body [m]."""
+    """(K, 3) standard deviation of `offset_m` between bodies [m]."""
     poses: Annotated[Floats, (len(JOINTS), 3, N_POSES)]
-    """(J, 3, M) poses that stand for those of the data, as of `outline.pose_of`."""
+    """(J, 3, M) poses that represent those of the data, in the coordinates of `outline.pose_of`."""
     near_m: Annotated[Floats, ()]
-    """Distance from the nearest pose (`outline.novelty_m`) up to which a body is not new [m]."""
+    """Distance from the nearest of `poses` (`outline.novelty_m`) up to which a pose counts as known
+    [m]."""
     novel: Annotated[Floats, (N_KINDS,)]
-    """(K,) factor on the square of the distance beyond `near_m`, which is added to the standard
+    """(K,) factor on the squared distance beyond `near_m`; the product is added to the standard
     deviation [1/m]."""
     tail: Annotated[Floats, (N_POSTURES,)]
-    """(P,) weight of rare large errors: a normal vector n is lengthened by 1 + tail n.n / 3."""
+    """(P,) weight of rare large errors: a normal vector n is multiplied by 1 + tail n.n / 3."""
     bias: Annotated[Floats, (N_VIEWS, N_KINDS, 2)]
-    """(A, K, 2) mean error in the image by the direction of view, of side."""
+    """(A, K, 2) mean error in the image for each viewing direction [sides]."""
     size: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS)]
-    """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
+    """(P, S, K) median over time of the standard deviation of each coordinate [sides]."""
     spread: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS)]
-    """(P, S, K) standard deviation of the logarithm of that size, joint by joint."""
+    """(P, S, K) standard deviation of the logarithm of `size` for each joint."""
     body: Annotated[Floats, (N_POSTURES, len(BODY_KNOTS))]
-    """(P, Q) quantiles at `BODY_KNOTS` of the logarithm of the factor of a whole body."""
+    """(P, Q) quantiles at `BODY_KNOTS` of the logarithm of a factor on the errors of all joints."""
     common: Annotated[Floats, ()]
-    """Share of the sizes' variance that is due to this factor; the confidence follows it."""
+    """Share of the variance of the errors' sizes that is due to the factor of `body`; confidences
+    are correlated with this part."""
     shares: Annotated[Floats, (N_KINDS, 3)]
-    """(K, 3) shares of the variance in a camera: constant by the view, lasting for `slow_s`, and
-    new in every image; their sum is 1."""
+    """(K, 3) shares of the variance in a camera that are constant for a view, last for `slow_s`, or
+    are new in every image; their sum is 1."""
     slow_s: Annotated[Floats, ()]
     """Time constant of lasting errors while the worker stands still [s]."""
     slow_m: Annotated[Floats, ()]
-    """Distance that the joints travel until lasting errors have changed [m]."""
+    """Distance constant of lasting errors: path of the joints over which they decay to 1/e [m]."""
     limb: Annotated[Floats, (N_KINDS,)]
-    """(K,) correlation with the error of the next joint towards the trunk."""
+    """(K,) correlation of a joint's error with that of the next joint towards the trunk."""
     confidence: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS, len(KNOTS))]
-    """(P, S, K, Z) quantiles of the reported visibility at `KNOTS`, in rising order."""
+    """(P, S, K, Z) quantiles of the reported visibility at `KNOTS`, in ascending order."""
     follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """(S, K) correlation of the visibility with the smallness of the error."""
+    """(S, K) correlation of the reported visibility with the smallness of the error."""
     swap_share: Annotated[Floats, (N_POSTURES, N_VIEWS, 2)]
-    """(P, A, 2) share of the time in which left and right are exchanged: of all joints, of the legs
-    alone."""
+    """(P, A, 2) share of the time in which the left and right labels are swapped: those of all
+    joints, and those of the legs only."""
     swap_s: Annotated[Floats, (2,)]
-    """(2,) time constants of the normal variables in the lower tails of which they happen [s]."""
+    """(2,) time constants of the normal variables that cause swaps in their lower tails [s]."""
     miss_share: Annotated[Floats, (N_POSTURES, N_SEEN)]
-    """(P, 16) share of the time in which no worker is found, by the number of joints that are seen,
-    0 to 15."""
+    """(P, 16) share of the time in which a worker is not found, by the number of seen joints from 0
+    to 15."""
     miss_s: Annotated[Floats, ()]
-    """Time constant of the normal variable in the lower tail of which a miss happens [s]."""
+    """Time constant of the normal variable that causes misses in its lower tail [s]."""
     sigma: Annotated[Floats, (N_POSTURES, N_KINDS, _N_VISIBILITIES)]
-    """(P, K, V) standard deviation that is reported, a share of the stature, at `VISIBILITY`."""
+    """(P, K, V) reported standard deviation at `VISIBILITY`, as a share of the stature."""
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
     name: get_args(hint)[1]
     for name, hint in get_type_hints(Calibration, include_extras=True).items()
 }
-"""Shapes of the tables of a calibration by name."""
+"""Shapes of the tables of a calibration, by name."""
 _POSITIVE = ("size", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 LONGEST_TAIL = 3.0
-"""Greatest value of `tail`, for which a normal vector n is lengthened by 1 + n.n."""
+"""Greatest allowed value of `tail`, at which a normal vector n is multiplied by 1 + n.n."""
 _RENEW = "make a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """Return the calibration of a file (None: the package's); `ConfigError` for a bad one."""
+    """Read a calibration file, by default the package's; raise `ConfigError` if it is invalid."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
 def changed_ns(path: Path | str) -> int:
-    """Return when a calibration file was last written [ns]; `ConfigError` if there is none."""
+    """Return the modification time of a calibration file [ns]; raise `ConfigError` without one."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError as error:
@@ -146,7 +149,7 @@ def changed_ns(path: Path | str) -> int:
 
 @functools.lru_cache(maxsize=8)
 def _read(path: Path, changed: int) -> Calibration:
-    """Return the calibration of a file, kept until the file has changed."""
+    """Read a calibration file; the result is cached until the file changes."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
@@ -170,7 +173,7 @@ def _read(path: Path, changed: int) -> Calibration:
 
 
 def _parse_table(name: str, value: Any, path: Path) -> Floats:
-    """Return a table of a file, read-only; `ConfigError` for other shapes or values."""
+    """Return a table of a file as a read-only array; raise `ConfigError` if it is invalid."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):

@@ -1,7 +1,7 @@
-"""Pixels to keypoints: crops of every camera through BlazePose, two at a time.
+"""Detection of keypoints in crops of all cameras by BlazePose, two crops at a time.
 
-The calling thread draws crops while two others run the networks on them. Each of these has
-interpreters of its own, so that results do not depend on the order in which crops are processed.
+The calling thread renders crops while two other threads run the networks on them. Each of these
+threads has separate interpreters, so that results do not depend on the order of processing.
 """
 
 import functools
@@ -47,21 +47,21 @@ SIDE = network.LANDMARK_SIDE
 """Side of the crops [px]."""
 ResultT = TypeVar("ResultT")
 _THREAD = threading.local()
-"""The `networks` of one of a detector's two threads."""
+"""Thread-local storage of the `networks` of a detector's thread."""
 KeypointFunction: TypeAlias = Callable[[Image], Floats | None]
 """Function from a crop (256, 256, 3), RGB of uint8, to (J, 3): x, y [px] from the crop's corner and
-confidence in [0, 1] of `core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found, and None
-if there is no person."""
+confidence in [0, 1] of `core.skeleton.JOINTS`. Joints that are not found have NaN, NaN, 0; the
+result is None if there is no person."""
 DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
     "detector", {"blazepose": None}
 )
-"""By name: a function that makes the keypoint function, once for every thread that calls it."""
+"""Factories of keypoint functions by name; each thread that detects keypoints calls one once."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class DetectorConfig:
-    """Settings of the detector: its networks, and the thresholds of detections."""
+    """Settings of the detector: networks and thresholds of detections."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "gate_every": "check_every",
@@ -69,34 +69,35 @@ class DetectorConfig:
         "folded": "folded_network",
         "max_offset": "max_hip_offset",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their old names."""
 
     min_presence: float = 0.5
-    """Least person flag [0..1] of landmarks that count; the default is MediaPipe's."""
+    """Minimum presence score [0..1] of accepted landmarks; the default is MediaPipe's."""
     check_presence: float = 0.9
-    """Person flag [0..1] below which the detector stage checks a detection."""
+    """Presence score [0..1] below which the detector stage checks a detection."""
     check_every: int = 25
-    """Number of detections after which the detector stage checks one in any case; 25 is once a
-    second at 25 Hz."""
+    """Number of detections after which the detector stage always checks one; 25 means once a second
+    at 25 Hz."""
     max_hip_offset: float = 0.25
-    """Greatest distance of hips from the middle of the window, as a share of its side; hips beyond
-    it are another person's."""
+    """Maximum distance of the hips from the window's centre, as a share of its side; hips farther
+    away belong to another person."""
     outside_confidence: float = 0.1
-    """Greatest confidence of joints that the network places outside the image, which are
-    guesses."""
+    """Maximum confidence of joints that the network places outside the image, where it can only
+    guess."""
     search_every: int = 5
-    """Number of steps between searches of a camera's whole image in which no person is found."""
+    """Number of steps between searches of a camera's whole image while no person is found in it."""
     runtime: str = "litert"
     """Runtime of the networks: "litert", "openvino" (an extra, faster) or "auto"."""
     network: str = "full"
-    """Landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with `python -m
-    hrc_env setup --networks lite heavy`."""
+    """Landmark network: "lite", "full" or "heavy"; "lite" and "heavy" must be fetched once with
+    `python -m hrc_env setup --networks lite heavy`."""
     keypoints: str = "blazepose"
     """Function that finds joints in crops: "blazepose" for BlazePose's landmark network, or the
-    name of a registered one (`hrc_env.register_detector`); searches for people always use
+    name of a registered function (`hrc_env.register_detector`); searches for people always use
     BlazePose."""
     folded_network: str = "full"
-    """Landmark network for workers that bend, squat or kneel; "heavy" is more exact, and slower."""
+    """Landmark network for workers that bend, squat or kneel; "heavy" is more accurate but
+    slower."""
 
     def __post_init__(self) -> None:
         check_names("detector.runtime", [self.runtime], network.RUNTIMES)
@@ -108,25 +109,29 @@ class DetectorConfig:
 
     @property
     def weights(self) -> tuple[str, ...]:
-        """Names of the weights that these networks need."""
+        """Names of the weights that the chosen networks need."""
         landmark = dict.fromkeys((self.network, self.folded_network))
         return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """A worker in the images of all cameras; NaN, 0 and infinity where a camera shows none."""
+    """The detection of a worker in the images of all cameras.
+
+    For cameras that do not show the worker, pixels are NaN, confidences 0 and standard deviations
+    infinite.
+    """
 
     px: Points2
-    """(C, J, 2) joints in the whole image, as its lens distorts it [px]."""
+    """(C, J, 2) joints in pixels of the whole image, including lens distortion [px]."""
     confidence: Floats
-    """(C, J) visibility in [0, 1]."""
+    """(C, J) visibilities in [0, 1]."""
     sigma_px: Floats
     """(C, J) standard deviation of each coordinate [px]."""
     windows: Views
-    """(C,) window of each camera in which the worker was searched."""
+    """(C,) window of each camera in which the worker was looked for."""
     crops: list[Image | None] = field(default_factory=list)
-    """(C,) crop of each window, as the network got it."""
+    """(C,) crop of each window, as it was passed to the network."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,23 +139,23 @@ class _Networks:
     """The networks of one thread."""
 
     detect: network.PersonDetector
-    """Detector stage."""
+    """Detector stage, which finds people."""
     landmark: dict[str, network.Landmarker]
-    """Landmark stages by name."""
+    """Landmark stages by name, which find joints."""
     registered: KeypointFunction | None
-    """Function that finds joints instead of these; None: there is none."""
+    """Registered function that replaces the landmark stages, or None."""
 
 
 class PoseDetector(Stateful):
     """A detector of the joints of workers in the images of a rig.
 
-    Its networks and their threads are made by the first detection, and are not pickled.
+    The networks and their threads are created by the first detection and are not pickled.
 
     Args:
         cameras: the rig.
-        config: settings; None: the defaults.
-        floor_world: (N, 3) points of the floor where people may stand [m]; None: unknown.
-        error: table `sigma` of a calibration, from which standard deviations follow.
+        config: settings; None for the defaults.
+        floor_world: (N, 3) points of the floor where people may stand [m]; None if unknown.
+        error: table `sigma` of a calibration, which gives the reported standard deviations.
 
     Raises:
         WeightsError: the networks' weights are missing and cannot be fetched.
@@ -173,9 +178,9 @@ class PoseDetector(Stateful):
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self.blank: frozenset[int] = frozenset()
-        """Cameras with a blank image in the last search: dark, white, of one colour, or noise."""
+        """Indices of the cameras with a blank image (uniform or mere noise) in the last search."""
         self._counts: dict[int, list[int]] = {}
-        """Number of detections of each track by each camera since the detector stage must check."""
+        """Numbers of consecutive detections in each camera, by track; 0 requires a check."""
         self._threads: ThreadPoolExecutor | None = None
         self._lender: PoseDetector | None = None
 
@@ -192,11 +197,11 @@ class PoseDetector(Stateful):
         """Detect a worker in one window of each camera, or by a search if there is no window.
 
         Args:
-            source: the cameras' present images.
+            source: the present images of the cameras.
             windows: (C,) windows of the worker; None for cameras without one.
             track: number of the worker's track.
-            others: windows (C,) of other workers, which a search leaves out.
-            found: result of `search` in these images; None: it was not called.
+            others: windows (C,) of other workers, which a search excludes.
+            found: result of `search` in these images; None if it was not called.
             folded: whether the worker is expected to be folded (`outline.is_folded`).
             posture: expected posture (`outline.posture_of`).
         """
@@ -214,14 +219,14 @@ class PoseDetector(Stateful):
         return _no_detection([None] * len(windows))
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Search whole images for people, and keep those with high confidence of both networks.
+        """Search whole images for people that both networks detect with high confidence.
 
         Args:
-            source: the cameras' present images.
-            which: indices of the cameras to search; None: all.
+            source: the present images of the cameras.
+            which: indices of the cameras to search; None for all.
 
         Returns:
-            (C,) windows of the people in each image, best first; none for cameras that were not
+            (C,) windows of the people in each image, best first; empty for cameras that were not
             searched.
         """
         which = range(len(self.cameras)) if which is None else which
@@ -241,20 +246,20 @@ class PoseDetector(Stateful):
         return [[window for k, window in known if k == c] for c in range(len(self.cameras))]
 
     def forget(self, track: int) -> None:
-        """Treat a track as new: the detector stage checks its next detection."""
+        """Forget a track, so that the detector stage checks its next detection."""
         self._counts.pop(track, None)
 
     def borrow_networks(self, lender: "PoseDetector") -> None:
         """Use the threads and networks of another detector with the same settings.
 
-        The lender closes them.
+        The lender remains responsible for closing them.
         """
         if lender.config != self.config:
             raise ConfigError("A detector borrows networks from one of the same settings.")
         self._lender = lender
 
     def close(self) -> None:
-        """Stop the threads and free their networks; the next detection makes them anew."""
+        """Stop the threads and free their networks; the next detection creates new ones."""
         if self._threads is not None:
             self._threads.shutdown(wait=True, cancel_futures=True)
         self._threads = None
@@ -270,7 +275,7 @@ class PoseDetector(Stateful):
         folded: bool,
         posture: Sequence[float],
     ) -> Detection:
-        """Return a worker's joints in these windows (C,); see `detect`."""
+        """Detect a worker's joints in these windows (C,); see `detect`."""
         counts = self._counts.setdefault(track, [0] * len(self.cameras))
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
         seen, doubts = _no_detection(windows), [1.0] * len(windows)
@@ -281,7 +286,7 @@ class PoseDetector(Stateful):
             check = self._must_check(counts[c], c)
             return functools.partial(_find_joints, crop, window, check, folded, self.config)
 
-        joints_of = self._run_jobs(prepare(c, window) for c, window in used)  # drawn one by one
+        joints_of = self._run_jobs(prepare(c, window) for c, window in used)  # rendered one by one
         before, counts[:] = list(counts), [0] * len(counts)  # 0: the detector stage checks next
         for (c, window), joints in zip(used, joints_of, strict=True):
             if joints is not None:
@@ -291,9 +296,9 @@ class PoseDetector(Stateful):
         return seen
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Developed:
-        """Return a developed copy of a crop, as renderers draw over theirs.
+        """Return a developed copy of a crop, because renderers reuse their arrays.
 
-        It is black outside of the camera's image.
+        The copy is black outside the camera's image.
         """
         crop, camera = crop_image(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
@@ -304,7 +309,7 @@ class PoseDetector(Stateful):
         return developed._replace(picture=picture)
 
     def _must_check(self, count: int, camera: int) -> bool:
-        """Return whether the detector stage is due; cameras take turns, to spread its cost."""
+        """Return whether the detector stage must check; cameras take turns to spread the cost."""
         every = self.config.check_every
         return count == 0 or (count + camera * every // len(self.cameras)) % every == 0
 
@@ -315,12 +320,12 @@ class PoseDetector(Stateful):
         for job in jobs:
             try:
                 results.append(threads.submit(self._run_job, job).result)
-            except RuntimeError:  # the interpreter is ending, and its threads take no more work
+            except RuntimeError:  # the interpreter shuts down, and its threads reject new jobs
                 results.append(functools.partial(self._run_job, job))
         return [result() for result in results]
 
     def _get_threads(self) -> ThreadPoolExecutor:
-        """Return the threads, which are started if need be; a lender's if there is one."""
+        """Return the threads, or those of a lender, and start them if necessary."""
         if self._lender is not None:
             return self._lender._get_threads()
         if self._threads is None:
@@ -328,7 +333,7 @@ class PoseDetector(Stateful):
         return self._threads
 
     def _run_job(self, job: Callable[[_Networks], ResultT]) -> ResultT:
-        """Return the result of a job with this thread's networks."""
+        """Run a job with the networks of the present thread, and return its result."""
         if not hasattr(_THREAD, "networks"):
             _THREAD.networks = _make_networks(self.config)
         return job(_THREAD.networks)
@@ -336,7 +341,7 @@ class PoseDetector(Stateful):
     def _write(
         self, seen: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
     ) -> None:
-        """Write the joints (J, 3) that were found in a window of camera c."""
+        """Store the joints (J, 3) found in a window of camera c in a detection."""
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
@@ -346,14 +351,14 @@ class PoseDetector(Stateful):
 
 
 def _no_detection(windows: Sequence[Roi | None]) -> Detection:
-    """Return a detection in which no camera shows the worker."""
+    """Return an empty detection: no camera shows the worker."""
     shape = (len(windows), N_JOINTS)
     nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
     return Detection(*nothing, list(windows), [None] * len(windows))
 
 
 def _make_networks(config: DetectorConfig) -> _Networks:
-    """Return the networks of one thread."""
+    """Load the networks of one thread."""
     names, runtime = {config.network, config.folded_network}, config.runtime
     landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
@@ -364,15 +369,15 @@ def call_detector(find: KeypointFunction, crop: Image, window: Roi) -> Floats | 
     """Return the joints that a registered function finds in a crop.
 
     Args:
-        find: the function.
-        crop: (256, 256, 3) picture of the window.
-        window: the window in the image [px].
+        find: the registered function.
+        crop: (256, 256, 3) crop of the window.
+        window: window of the image [px].
 
     Returns:
-        (J, 3) pixels of the image and confidence; None if there is no person.
+        (J, 3) pixels of the image and confidences, or None if there is no person.
 
     Raises:
-        ConfigError: the function returns neither.
+        ConfigError: the function returns an array of another shape or invalid confidences.
     """
     found = find(crop)
     if found is None:
@@ -393,15 +398,15 @@ def _find_joints(
     """Return the joints of the person in a crop.
 
     Args:
-        crop: (256, 256, 3) picture of the window.
-        window: the window in the image [px].
+        crop: (256, 256, 3) crop of the window.
+        window: window of the image [px].
         check: whether the detector stage must confirm the person.
         folded: whether the person is expected to be folded.
         config: settings of the detector.
         nets: networks of this thread.
 
     Returns:
-        (J, 3) pixels of the image and visibility; None if there is no person.
+        (J, 3) pixels of the image and visibilities, or None if there is no person.
     """
     if nets.registered is not None:
         return call_detector(nets.registered, crop, window)
@@ -420,7 +425,7 @@ def _find_joints(
 
 @functools.lru_cache(maxsize=64)
 def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8] | None:
-    """Return which pixels (256, 256) of a crop are in the image, not 0; None if all are."""
+    """Return a mask (256, 256) of a crop's pixels that are in the image, or None if all are."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
     frame = np.array([width_px, height_px])
     square = blazepose.to_image(corners, window)

@@ -1,7 +1,7 @@
-"""Quality of dark pictures: a model of the detector on developed pictures (`exposure`).
+"""Quality of dark images: a model of the detector's errors on developed images (`exposure`).
 
-It is for the emulator, which has no pictures. `python -m benchmarks.perception.dim` prints the
-errors of crops to which it was fitted.
+The model is used by the emulator, which has no images. `python -m benchmarks.perception.dim` prints
+the errors in crops to which it was fitted.
 """
 
 import math
@@ -15,42 +15,42 @@ from hrc_env.perception.exposure import LEAST_CONTRAST, ROUNDING, noise_factor
 from hrc_env.perception.faults.corruptions import GAMMA, darkness_noise
 
 SPAN = 166.0
-"""Grey levels between dark and bright parts in usual light, the median of the lab and the site."""
+"""Span between the grey levels of dark and bright parts in usual light: median of lab and site."""
 OF_GREY = 0.67
-"""Noise of the grey levels as a share of that of the colours, which is independent."""
+"""Ratio of the noise of grey levels to that of the colour channels, which is independent."""
 TEXTURE = 0.04
-"""Noise that is measured because of fine patterns of the scene, as a share of the span."""
+"""Apparent noise due to fine textures of the scene, as a share of the span."""
 CONTRAST = 0.21
-"""Coarse contrast (`exposure.is_blank`) as a share of the span."""
+"""Coarse contrast (see `exposure.is_blank`) as a share of the span."""
 BLANK = (0.59, 0.92)
-"""Contrasts in units of `LEAST_CONTRAST` at which all parts of a picture are blank, and none
-are."""
+"""Contrasts, in units of `LEAST_CONTRAST`, at which all parts of an image are blank, and at which
+none is."""
 USELESS = 0.18
-"""Limit of the noise as in `exposure.USELESS`, by the noise that is modelled here."""
+"""Limit of the noise as in `exposure.USELESS`, but for the noise that is modelled here."""
 NOISE: Floats = np.array([0.160, 0.170, 0.200, 0.230, 0.260])
-"""Noise as a share of the span at which `MISSED` is given."""
+"""Noise levels, as shares of the span, at which `MISSED` is given."""
 MISSED: Floats = np.array([0.0, 0.015, 0.2, 0.8, 1.0])
-"""Additional share of the time in which a camera misses people at `NOISE`: from ten episodes each
-with the fault `darkness` of amounts 0.01 to 0.003."""
+"""Additional share of the time in which a camera misses people at `NOISE`, measured in ten episodes
+for each of several amounts of the fault `darkness` from 0.01 to 0.003."""
 
 
 class Quality(NamedTuple):
-    """The quality of pictures, in arrays of one shape."""
+    """The quality of images, as arrays of equal shape."""
 
     doubt: Floats
-    """Factor on the errors of joints and on their reported deviations."""
+    """Factor on the errors of joints and on their reported standard deviations."""
     missed: Floats
     """Additional share of the time in which people are missed."""
     blank: Bools
-    """Whether the pictures show nothing, and hence do not prove absence."""
+    """Whether the images show nothing, so that they do not prove the absence of people."""
 
 
 def picture_quality(light: float, darkness: Sequence[float] = ()) -> Quality:
-    """Return the quality of pictures in some light.
+    """Return the quality of images in a given light.
 
     Args:
-        light: strength of all light, as in `AppearanceConfig`; 1 is as the scene was built.
-        darkness: amounts of the camera's faults `darkness`, in the order of their application.
+        light: strength of all light, as in `AppearanceConfig`; 1 for the scene as built.
+        darkness: amounts of the camera's `darkness` faults, in the order of their application.
     """
     span, noise = SPAN * light, 0.0
     for share in darkness:

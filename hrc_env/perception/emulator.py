@@ -1,33 +1,35 @@
-"""Keypoints without pixels: the projected truth with BlazePose's errors.
+"""Emulation of keypoints without images: projected true joints with BlazePose's errors.
 
-The errors are drawn from a calibration that was fitted to the network's detections in renders of
-workers (docs/emulator.md).
+The errors are drawn from a calibration that was fitted to the network's detections in rendered
+images of workers (docs/emulator.md).
 
-A window of side s surrounds the worker in every camera, turned as the torso is, as the detector
-would choose it. In it, of joint j of kind k in camera c:
+In every camera, a window of side s surrounds the worker. It is rotated with the torso, as the
+detector would choose it. The pixel of joint j of kind k in camera c is
 
     pixel = projection of (p_j + R (o_k + w_k far n)) + s T (b_k(view) + size whole m_j)
 
-R is the frame of the body: ahead, to the joint's own side, up; o and w an offset in space and its
-standard deviation (`offset_m`, `wander_m`); n is normal, shared by all cameras, and correlated
-along limbs and between hips and shoulders (`space_limb`); far = 1 + tail n.n / 3, so that now and
-then all cameras agree on a joint that is far off. In the image, b is the mean error from 8 views,
-mirrored for right joints (`bias`); size = exp(log size + spread z), z normal, of seen, hidden and
-outside joints (`size`, `spread`); whole a factor of all joints of a body in a camera, drawn from
-its measured quantiles (`body`); m = a cos(view) + b sin(view) drawn for the episode, a part that
-lasts and a part that is new, mixed with the next joint's towards the trunk (`shares`, `limb`); T
-the turn of the window.
-
-- n, z, whole and the lasting part of m are first-order autoregressions that keep
-  exp(-dt / `slow_s` - dt v / `slow_m`) a step, with v the mean speed of the joints.
+- R is the frame of the body: ahead, to the joint's side, up. o and w are the mean and the standard
+  deviation of an offset in space (`offset_m`, `wander_m`). n is a normal vector that all cameras
+  share, correlated along limbs and between hips and shoulders (`space_limb`). Because of the factor
+  far = 1 + tail n.n / 3, all cameras occasionally agree on a wrong, distant position.
+- b is the mean error in the image for 8 viewing directions, mirrored for right joints (`bias`).
+  size = exp(log size + spread z), with normal z, is given for seen, hidden and outside joints
+  (`size`, `spread`). whole is a factor on all joints of a body in a camera, drawn from its measured
+  quantiles (`body`).
+- m is the sum of a cos(view) + b sin(view), which is drawn once per episode, a lasting part and a
+  new part. It is mixed with m of the next joint towards the trunk (`shares`, `limb`). T is the
+  rotation of the window.
+- n, z, whole and the lasting part of m are first-order autoregressive processes with the
+  coefficient exp(-dt / `slow_s` - dt v / `slow_m`) per step, where v is the mean speed of the
+  joints.
 - The reported visibility is drawn from its measured quantiles (`confidence`) by a normal variable
   that is correlated with the smallness of the errors (`follows`, `common`).
 - Tables are given for bodies that stand, walk, handle something, are folded, and kneel; the
   posture is computed from the joints (`hrc_env/perception/outline.py`).
-- Occlusion is geometry: rays against scene, robot, bodies and things that are carried.
-- Left and right (of all joints, or of the legs) are exchanged, and a worker is missed, while a
-  slow normal variable is in its lower tail (`swap_share`, `miss_share`, `swap_s`, `miss_s`), so
-  that both last.
+- Occlusion is computed geometrically, by rays against scene, robot, bodies and carried objects.
+- The labels left and right (of all joints, or of the legs only) are swapped, and a worker is
+  missed, while a slow normal variable is in its lower tail (`swap_share`, `miss_share`, `swap_s`,
+  `miss_s`); both errors therefore last for several images.
 """
 
 import functools
@@ -58,24 +60,24 @@ class EmulatorConfig:
     """Settings of the detector's emulator."""
 
     calibration: str = ""
-    """Path of a calibration that `python -m assets.emulator.calibrate` wrote; empty: the package's.
-    The tracker uses its deviations and offsets at perception level `pixels` as well."""
+    """Path of a calibration written by `python -m assets.emulator.calibrate`; if empty, that of the
+    package. The tracker uses its deviations and offsets also at perception level `pixels`."""
     error_scale: float = 1.0
-    """Factor on all errors of position; 0 gives the projected truth. Reported deviations do not
-    change."""
+    """Factor on all position errors; 0 gives the projected true joints. It does not change the
+    reported standard deviations."""
     max_error: float = 0.4
-    """Greatest error of a joint in an image, as a share of the side of the window around the
+    """Maximum error of a joint in an image, as a share of the side of the window around the
     worker."""
     swap_share: float | None = None
-    """Share of the time in which a camera exchanges left and right; None: as calibrated, by
-    view."""
+    """Share of the time in which a camera swaps left and right; None for the calibrated shares,
+    which depend on the view."""
     miss_share: float | None = None
-    """Share of the time in which a camera does not find a worker; None: as calibrated, by the
-    number of joints in sight."""
+    """Share of the time in which a camera does not find a worker; None for the calibrated shares,
+    which depend on the number of joints in sight."""
     min_joints: int = 1
-    """Least number of joints (of 15) in sight of a camera with which it finds a worker."""
+    """Minimum number of joints (of 15) in sight of a camera for it to find a worker."""
     outside_confidence: float = 0.1
-    """Greatest confidence of joints outside the image, which are guesses; as in
+    """Maximum confidence of joints outside the image, where they are guesses; as in
     `DetectorConfig`."""
 
     def __post_init__(self) -> None:
@@ -85,7 +87,7 @@ class EmulatorConfig:
         self.make_calibration()
 
     def make_calibration(self) -> Calibration:
-        """Return the calibration with these settings; `ConfigError` for a bad file."""
+        """Return the calibration with these settings; raise `ConfigError` for an invalid file."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -98,23 +100,23 @@ class EmulatorConfig:
 
 @dataclass(frozen=True, slots=True)
 class EmulatorState:
-    """State of the detector's errors from image to image, in standard deviations."""
+    """State of the detector's errors, which evolve from image to image, in standard deviations."""
 
     errors: Records3[Errors]
     """(B, C, W) errors in each camera."""
     wander: Floats
-    """(B, W, J, 3) errors in space, the same for every camera: ahead, aside, up."""
+    """(B, W, J, 3) errors in space, which all cameras share: ahead, to the joint's side, up."""
     dt_s: float
     """Time between images [s]."""
 
 
 class Sights(NamedTuple):
-    """How cameras see joints and workers."""
+    """The views of joints and workers in cameras."""
 
     sight: Ints
-    """(B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
+    """(B, C, W, J) visibility of each joint: `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
     look: Floats
-    """(B, C, W, `N_LOOK`) columns `sightlines.SIDE` to `STEPPING`."""
+    """(B, C, W, `N_LOOK`) view of each worker: columns `sightlines.SIDE` to `STEPPING`."""
 
 
 def make_state(
@@ -127,10 +129,10 @@ def make_state(
         n_cameras: number of cameras.
         n_workers: number of workers.
         dt_s: time between images [s].
-        config: settings.
+        config: settings of the emulator.
 
     Raises:
-        ConfigError: the time is not positive.
+        ConfigError: `dt_s` is not positive.
     """
     if not dt_s > 0:
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
@@ -139,7 +141,7 @@ def make_state(
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Rngs) -> None:
-    """Begin environments `ids` anew, with errors drawn from their stationary distribution."""
+    """Reset environments `ids`, with errors drawn from their stationary distribution."""
     *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
@@ -163,16 +165,18 @@ def emulate(
     Args:
         state: state of the errors, which is advanced by one image in place.
         rngs: one generator for each environment.
-        truth: (B, W, ...) the workers; their capsules hide joints of their own and of others.
-        surroundings: (B, ...) scene, carried things and robot, which hide joints too.
-        cameras: (C,) the rig.
+        truth: (B, W, ...) true state of the workers; their capsules hide joints of all workers.
+        surroundings: (B, ...) scene, carried objects and robot, which also hide joints.
+        cameras: (C,) cameras of the rig.
         config: settings, as given to `make_state`.
-        expected: (B, W, ...) the tracker's prediction, on which reported deviations depend; None,
-            and for workers without a track near: as in a search, an upright person.
-        dim: (B, C) quality of the pictures; None: usual light.
+        expected: (B, W, ...) prediction of the tracker, on which reported standard deviations
+            depend. If it is None, or a worker has no track nearby, they are those of an upright
+            person in a search.
+        dim: (B, C) quality of the images; None for usual light.
 
     Returns:
-        Keypoints in pixels of the images; NaN, 0 and infinity of a worker that is not found.
+        Keypoints in pixels of the images. For a worker that is not found, pixels are NaN,
+        confidences 0 and standard deviations infinite.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -199,7 +203,7 @@ def emulate(
 
 
 def _make_expected(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Expected:
-    """Return a prediction for the kernels; None: no tracks of joints of this shape."""
+    """Convert a prediction for the kernels; None is a prediction of this shape without tracks."""
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
@@ -208,7 +212,7 @@ def _make_expected(expected: PoseEstimate | None, shape: tuple[int, ...]) -> ker
 
 
 def _make_quality(dim: Quality | None, shape: tuple[int, int]) -> Floats:
-    """Return the quality (B, C, 2) of pictures for the kernels; None: usual light."""
+    """Convert the quality of images to an array (B, C, 2) for the kernels; None is usual light."""
     quality = np.zeros((*shape, 2))
     quality[..., kernels.DOUBT] = 1.0 if dim is None else dim.doubt
     quality[..., kernels.OVERLOOKED] = 0.0 if dim is None else dim.missed
@@ -218,12 +222,12 @@ def _make_quality(dim: Quality | None, shape: tuple[int, int]) -> Floats:
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
 ) -> Sights:
-    """Return how each camera sees each joint and each worker, without errors.
+    """Return the view of each joint and each worker in each camera, without errors.
 
     Args:
-        truth: (B, W, ...) the workers.
-        surroundings: (B, ...) scene, carried things and robot.
-        cameras: (C,) the rig.
+        truth: (B, W, ...) true state of the workers.
+        surroundings: (B, ...) scene, carried objects and robot.
+        cameras: (C,) cameras of the rig.
     """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
@@ -233,7 +237,7 @@ def lines_of_sight(
 
 
 def _make_world(truth: WorkerTruth, surroundings: Surroundings) -> World:
-    """Return workers and surroundings for the kernels."""
+    """Convert workers and surroundings for the kernels."""
     return World(
         joints=np.ascontiguousarray(truth.joints_world),
         velocity=np.ascontiguousarray(truth.velocity_world),
@@ -247,7 +251,7 @@ def _make_world(truth: WorkerTruth, surroundings: Surroundings) -> World:
 
 
 def shuffle_workers(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
-    """Return the poses (B, C, W, ...) of each camera in random order, without identities."""
+    """Shuffle the poses (B, C, W, ...) of each camera, so that they do not identify workers."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):
@@ -259,7 +263,7 @@ def shuffle_workers(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
 
 @functools.lru_cache(maxsize=16)
 def _make_rig(cameras: tuple[PinholeCamera, ...]) -> Records1[ImageCamera]:
-    """Return cameras (C,) for the kernels."""
+    """Convert cameras (C,) for the kernels."""
     rig = make_records(ImageCamera, len(cameras))
     for row, camera in zip(rig, cameras, strict=True):
         row["P"], row["eye"] = camera.P, camera.eye_world
@@ -272,7 +276,7 @@ def _make_rig(cameras: tuple[PinholeCamera, ...]) -> Records1[ImageCamera]:
 
 @functools.lru_cache(maxsize=16)
 def _make_tables(config: EmulatorConfig, dt_s: float, written_ns: int) -> kernels.Tables:
-    """Return a calibration for the kernels, read again if its file has been written anew."""
+    """Return the calibration for the kernels; `written_ns` identifies the version of its file."""
     known = config.make_calibration()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     of_posture = {name: getattr(known, name) for name in kernels.POSTURE.names or ()}

@@ -1,4 +1,7 @@
-"""The emulator's kernels: one environment after the other, see `emulator` for the model."""
+"""Compiled kernels of the emulator, which process one environment after another.
+
+The model is described in `emulator`.
+"""
 
 import math
 from typing import Annotated, NamedTuple
@@ -48,161 +51,163 @@ from hrc_env.perception.sightlines import (
     view_worker,
 )
 
+_LEFT_HIP, _RIGHT_HIP = JOINT["left_hip"], JOINT["right_hip"]
 N_NORMALS = 6
-"""Number of normal variables of a joint in an image: two of lasting errors, two of new ones, one of
-the errors' size, one of the confidence."""
+"""Number of normal variables per joint and image: two for lasting errors, two for new errors, one
+for the errors' size and one for the confidence."""
 SWAPPED, CROSSED, MISSED = range(3)
-"""Mistakes of the detector: left and right of all joints exchanged, of the legs alone, no worker
-found."""
+"""Mistakes of the detector: left and right labels of all joints or only of the legs are swapped, or
+the worker is not found."""
 DOUBT, OVERLOOKED = range(2)
-"""Columns of the quality of a picture: factor on errors and deviations, additional share of
-misses."""
+"""Columns of the quality of an image: factor on errors and standard deviations, and additional
+share of misses."""
 N_OF_BODY = 4
-"""Number of normal variables of a worker in an image: one of the errors' size, one of each
-mistake."""
+"""Number of normal variables per worker and image: one for the errors' size and one for each kind
+of mistake."""
 FOLLOWED_M = 0.5
-"""Greatest distance of a track's hips from a worker's [m] at which windows of the track show the
-worker: about `DetectorConfig.max_hip_offset` of a window's side."""
+"""Maximum distance between the hips of a track and those of a worker at which the track's windows
+show the worker: about `DetectorConfig.max_hip_offset` of a window's side [m]."""
 FIRST_OF_LEGS = JOINT["left_knee"]
-"""First joint of those that are exchanged with the legs."""
+"""First of the joints that are swapped with the legs."""
 
 
 class Errors:
     """The state of the errors of a worker in a camera, in standard deviations."""
 
     lasting: Annotated[Floats, (N_JOINTS, 2, 2)]
-    """Errors that last for the episode: (J, x and y, cosine and sine of the view)."""
+    """Errors that are constant over the episode: joint, x or y, cosine or sine of the view."""
     slow: Annotated[Floats, (N_JOINTS, 2)]
-    """Errors that last for a while, along x and y."""
+    """Slowly varying errors along x and y."""
     size: Annotated[Floats, (N_JOINTS,)]
-    """Logarithm of the size of each joint's errors, without the part of the whole body."""
+    """Logarithm of the size of each joint's errors, without the factor of the whole body."""
     sure: Annotated[Floats, (N_JOINTS,)]
-    """Confidence of each joint, as far as it is independent of the errors' size."""
+    """Part of each joint's confidence that is independent of the errors' size."""
     body: float
-    """Logarithm of the factor of the whole body on the errors' size."""
+    """Logarithm of the whole body's factor on the errors' size."""
     happening: Annotated[Floats, (3,)]
-    """Normal variables; `SWAPPED`, `CROSSED` and `MISSED` happen in their lower tails."""
+    """Normal variables that cause `SWAPPED`, `CROSSED` and `MISSED` in their lower tails."""
 
 
 class PostureTables:
     """The part of a calibration that depends on the posture; see `calibration.Calibration`."""
 
     offset_m: Annotated[Floats, (N_KINDS, 3)]
-    """Mean reported position from the joint: ahead, to its own side, up [m]."""
+    """Mean reported position relative to the true joint: ahead, to the joint's side, up [m]."""
     wander_m: Annotated[Floats, (N_KINDS, 3)]
-    """Standard deviation of that position over time [m]."""
+    """Standard deviation of the reported position over time [m]."""
     tail: float
     """Weight of rare large errors."""
     size: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """Logarithm of the standard deviation of each coordinate, of side."""
+    """Logarithm of the standard deviation of each coordinate in units of the window's side."""
     spread: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """Standard deviation of that logarithm."""
+    """Standard deviation of `size`."""
     body: Annotated[Floats, (len(BODY_KNOTS),)]
-    """Quantiles of the logarithm of the factor of a whole body."""
+    """Quantiles of the logarithm of the whole body's factor on the errors."""
     confidence: Annotated[Floats, (N_SIGHTS, N_KINDS, len(KNOTS))]
     """Logits of the quantiles of the reported visibility."""
     swap_share: Annotated[Floats, (N_VIEWS, 2)]
-    """Share of the time in which left and right are exchanged: of all joints, of the legs alone."""
+    """Share of the time in which left and right are swapped: for all joints, for the legs only."""
     miss_share: Annotated[Floats, (N_SEEN,)]
-    """Share of the time in which no worker is found, by the number of joints that are seen."""
+    """Share of the time in which the worker is not found, by the number of seen joints."""
     sigma: Annotated[Floats, (N_KINDS, len(VISIBILITY))]
-    """Standard deviation that is reported, a share of the stature, at `VISIBILITY`."""
+    """Reported standard deviation at `VISIBILITY`, as a share of the stature."""
 
 
 class Settings:
-    """The emulator's settings, and the calibration as far as it is independent of posture."""
+    """The emulator's settings, and the part of the calibration that is independent of posture."""
 
     space_limb: Annotated[Floats, (N_KINDS, 3)]
-    """Correlation of the reported position in space with the one of the `NEXT` joint."""
+    """Correlation of the reported position in space with that of the `NEXT` joint."""
     bias: Annotated[Floats, (N_VIEWS, N_KINDS, 2)]
-    """Mean error in the image by the direction of view, of side."""
+    """Mean error in the image for each viewing direction, as a share of the window's side."""
     limb: Annotated[Floats, (N_KINDS,)]
-    """Correlation with the error of the next joint towards the trunk."""
+    """Correlation of a joint's error with that of the next joint towards the trunk."""
     follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """Correlation of the visibility with the smallness of the error."""
+    """Correlation of the reported visibility with the smallness of the error."""
     shares: Annotated[Floats, (N_KINDS, 3)]
-    """Square roots of the shares of the variance: constant, lasting, new in every image."""
+    """Square roots of the constant, the lasting and the new share of the variance."""
     at_rest: float
-    """Share of the time constant of lasting errors that passes per image, while a worker stands."""
+    """Time between images, as a share of the time constant of lasting errors for a worker at
+    rest."""
     per_speed: float
-    """Increase of that share with the worker's speed [s/m]."""
+    """Increase of `at_rest` with the worker's speed [s/m]."""
     common: float
-    """Square root of the share of the sizes' variance that is due to the whole body."""
+    """Square root of the share of the sizes' variance that is due to the whole body's factor."""
     own: float
-    """Square root of the rest of that variance."""
+    """Square root of the remaining share of the sizes' variance."""
     keep: Annotated[Floats, (3,)]
-    """Coefficients of the autoregressions of `SWAPPED`, `CROSSED` and `MISSED`."""
+    """Coefficients of the autoregressive processes of `SWAPPED`, `CROSSED` and `MISSED`."""
     error_scale: float
-    """Factor on all errors of position."""
+    """Factor on all position errors."""
     max_error: float
-    """Greatest error in the image, of side."""
+    """Maximum error in the image, as a share of the window's side."""
     min_joints: float
-    """Least number of joints in sight with which a worker is found."""
+    """Minimum number of joints in sight for a worker to be found."""
     outside_confidence: float
-    """Greatest visibility that is reported of joints outside the image."""
+    """Maximum reported visibility of joints outside the image."""
     stature_of_side: float
-    """Stature of an upright worker, of side."""
+    """Stature of an upright worker, as a share of the window's side."""
 
 
 ERRORS = dtype_of(Errors)
 """The dtype of `Errors`."""
 POSTURE = dtype_of(PostureTables)
-"""The dtype of `PostureTables`: floats only, so that a row is also (N,) numbers."""
+"""The dtype of `PostureTables`; it has only floats, so that a row can be viewed as (N,) numbers."""
 SETTINGS = dtype_of(Settings)
 """The dtype of `Settings`."""
 
 
 class Tables(NamedTuple):
-    """A calibration as the kernels take it."""
+    """A calibration in the format of the kernels."""
 
     postures: Floats
-    """(P, N) the numbers of `PostureTables` for each posture."""
+    """(P, N) numbers of `PostureTables` for each posture."""
     settings: Records1[Settings]
-    """(1,) the rest."""
+    """(1,) settings and tables that do not depend on the posture."""
 
 
 class Report(NamedTuple):
-    """The keypoints that are written."""
+    """The reported keypoints, which are the output of the kernels."""
 
     px: Points2
     """(B, C, W, J, 2) pixels; NaN where there is no measurement."""
     confidence: Floats
-    """(B, C, W, J) visibility in [0, 1]; 0 where there is no measurement."""
+    """(B, C, W, J) visibilities in [0, 1]; 0 where there is no measurement."""
     sigma_px: Floats
     """(B, C, W, J) standard deviation of each coordinate [px]."""
 
 
 class Expected(NamedTuple):
-    """The tracker's prediction."""
+    """The tracker's prediction in the format of the kernels."""
 
     joints: Points3
-    """(B, W, J, 3) joints [m]."""
+    """(B, W, J, 3) positions of the joints [m]."""
     velocity: Velocities3
     """(B, W, J, 3) velocities of the joints [m/s]."""
     tracked: Bools
-    """(B, W) whether there is a track."""
+    """(B, W) whether each worker slot has a track."""
 
 
 class Mistakes(NamedTuple):
-    """The mistakes of the detector about a worker in an image."""
+    """The detector's mistakes about a worker in an image."""
 
     is_swapped: bool
-    """Whether left and right of all joints are exchanged."""
+    """Whether the left and right labels of all joints are swapped."""
     is_crossed: bool
-    """Whether left and right of the legs are exchanged."""
+    """Whether the left and right labels of the legs are swapped."""
     is_found: bool
-    """Whether the worker is found at all."""
+    """Whether the worker is found."""
 
 
 class Between(NamedTuple):
-    """A place between two entries of a table."""
+    """A position between two entries of a table, for interpolation."""
 
     low: int
-    """Index of the entry before the place."""
+    """Index of the entry before the position."""
     high: int
-    """Index of the entry behind the place."""
+    """Index of the entry after the position."""
     part: float
-    """Distance from the first entry, as a share of the distance between both."""
+    """Distance from the entry `low`, as a share of the distance between both entries."""
 
 
 @kernel(makes_arrays=True)
@@ -217,18 +222,18 @@ def emulate_batch(
     tables: Tables,
     report: Report,
 ) -> None:
-    """Advance the errors by one image, and write keypoints.
+    """Advance the errors by one image, and compute the keypoints.
 
     Args:
-        errors: (B, C, W) state in each camera, which is changed.
-        wander: (B, W, J, 3) state that all cameras share, which is changed.
-        normals: (B, N) standard normal numbers: for bodies, then for images.
+        errors: (B, C, W) state of the errors in each camera, which is changed.
+        wander: (B, W, J, 3) state of the errors that all cameras share, which is changed.
+        normals: (B, N) standard normal numbers: first for bodies, then for images.
         world: workers and surroundings.
-        expected: the tracker's prediction.
+        expected: prediction of the tracker.
         rig: (C,) cameras.
-        quality: (B, C, 2) quality of the pictures: `DOUBT` and `OVERLOOKED`.
+        quality: (B, C, 2) quality of the images: `DOUBT` and `OVERLOOKED`.
         tables: the calibration.
-        report: is filled.
+        report: output: the keypoints.
     """
     batch, n_cameras, n_workers = errors.shape
     occluders, views = make_room(world), np.empty(2, WORKER_VIEW)
@@ -262,7 +267,7 @@ def emulate_batch(
                 factor = quality[b, c, DOUBT]
                 px, confidence = report.px[b, c, w], report.confidence[b, c, w]
                 _write_keypoints(px, confidence, state, view, off, here, common, mistakes, factor)
-                side = view.look[SIDE]  # a search's window is around the worker in the image
+                side = view.look[SIDE]  # a search finds the window around the worker's image
                 if track >= 0:
                     side = project_worker(
                         rig[c], expected.joints[b, track], views[1].uv, views[1].depth
@@ -273,19 +278,25 @@ def emulate_batch(
 
 @kernel
 def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
-    """Return the track (W) with windows that show a worker (J, 3): the nearest by the hips.
+    """Return the index of the track whose image windows show a worker, or -1 if there is none.
 
-    Returns:
-        Its index; -1 if there is none.
+    It is the track whose expected middle of the hips is nearest to the worker's, if that is nearer
+    than `FOLLOWED_M`: the detector looks for a person in windows around the expected body.
+
+    Args:
+        joints: (J, 3) true joints of the worker in the world frame [m].
+        expected: (W, J, 3) joints that the tracker expects, in the world frame [m].
+        tracked: (W,) whether there is a track.
     """
-    nearest, track = FOLLOWED_M, -1
-    for t in range(len(tracked)):
-        squared = 0.0
+    nearest_m, track = FOLLOWED_M, -1
+    for w in range(len(tracked)):
+        squared_m2 = 0.0
         for i in range(3):
-            off = joints[7, i] + joints[8, i] - expected[t, 7, i] - expected[t, 8, i]
-            squared += 0.25 * off * off
-        if tracked[t] and squared < nearest * nearest:
-            nearest, track = math.sqrt(squared), t
+            hips = joints[_LEFT_HIP, i] + joints[_RIGHT_HIP, i]
+            twice_m = hips - expected[w, _LEFT_HIP, i] - expected[w, _RIGHT_HIP, i]
+            squared_m2 += 0.25 * twice_m * twice_m  # of the middles, which are half of the sums
+        if tracked[w] and squared_m2 < nearest_m * nearest_m:
+            nearest_m, track = math.sqrt(squared_m2), w
     return track
 
 
@@ -293,15 +304,15 @@ def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
 def _write_sigma(
     confidence: Floats, stature_px: float, expected: PostureTables, sigma: Floats
 ) -> None:
-    """Write the standard deviations that the detector reports.
+    """Compute the standard deviations that the detector reports.
 
-    They follow from all that it knows: the confidence, the stature and the expected posture.
+    They depend on the confidence, the stature and the expected posture, which the detector knows.
 
     Args:
-        confidence: (J,) reported visibility.
+        confidence: (J,) reported visibilities.
         stature_px: stature in the worker's window [px].
         expected: tables of the expected posture.
-        sigma: (J,) is filled [px].
+        sigma: (J,) output: the standard deviations [px].
     """
     for j in range(N_JOINTS):
         sigma[j] = stature_px * error_share(confidence[j], VISIBILITY, expected.sigma[KIND[j]])
@@ -314,40 +325,53 @@ def _advance_wander(
     joints: Points3,
     front: Facing,
     keep: float,
-    here: PostureTables,
-    common: Settings,
+    posture: PostureTables,
+    shared: Settings,
     meant: Points3,
 ) -> None:
-    """Write where in space the detector places the joints, the same for every camera.
+    """Advance the errors that all cameras share, and write the joints with these errors.
+
+    Each joint has an error of unit variance along three axes of the body: ahead, to the joint's own
+    side, up. It is a mixture of the error of the next joint towards the trunk and of its own error
+    w, which follows an autoregression:
+
+        w = keep w + sqrt(1 - keep^2) n,    e = r e_parent + sqrt(1 - r^2) w
+        displacement = offset + deviation (1 + tail |e|^2 / 3) e
+
+    with n from `normals`, and the correlation r, offset, deviation and tail from the calibration.
 
     Args:
-        wander: (J, 3) state, which is changed.
+        wander: (J, 3) own errors w in standard deviations, changed in place.
         normals: (3 J or more,) standard normal numbers.
-        joints: (J, 3) true joints [m].
-        front: direction to the front of the body.
-        keep: coefficient of the autoregression.
-        here: tables of the worker's posture.
-        common: tables that do not depend on the posture.
-        meant: (J, 3) is filled [m].
+        joints: (J, 3) true joints in the world frame [m].
+        front: horizontal unit vector to the front of the body in the world frame.
+        keep: coefficient of the autoregression, 0 to 1.
+        posture: tables of the worker's posture.
+        shared: tables that do not depend on the posture.
+        meant: (J, 3) receives the joints where the detector believes them, in the world frame [m];
+            an array other than `joints`.
     """
-    renew, scale = math.sqrt(1.0 - keep * keep), common.error_scale
-    tail = here.tail / 3.0
+    renew, error_scale = math.sqrt(1.0 - keep * keep), shared.error_scale
+    errors = meant  # the array holds the errors e first, and then the joints
     for j in range(len(joints)):
-        before: int = NEXT[j]
+        parent: int = NEXT[j]  # before joint j in the order of joints; j itself without a parent
         for i in range(3):
             wander[j, i] = keep * wander[j, i] + renew * normals[3 * j + i]
-            limb = common.space_limb[KIND[j], i] if before != j else 0.0
-            meant[j, i] = limb * meant[before, i] + math.sqrt(1.0 - limb * limb) * wander[j, i]
+            correlation = shared.space_limb[KIND[j], i] if parent != j else 0.0
+            own_share = math.sqrt(1.0 - correlation * correlation)
+            errors[j, i] = correlation * errors[parent, i] + own_share * wander[j, i]
+    tail = posture.tail / 3.0  # the mean of |e|^2 is 3
     for j in range(len(joints)):
-        kind, n = KIND[j], meant[j]
-        offset, spread = here.offset_m[kind], here.wander_m[kind]
-        far = 1.0 + tail * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        ahead = offset[0] + spread[0] * far * n[0]
-        left = HAND[j] * (offset[1] + spread[1] * far * n[1])
-        up = offset[2] + spread[2] * far * n[2]
-        meant[j, 0] = joints[j, 0] + scale * (front.x * ahead - front.y * left)
-        meant[j, 1] = joints[j, 1] + scale * (front.y * ahead + front.x * left)
-        meant[j, 2] = joints[j, 2] + scale * up
+        kind, error = KIND[j], errors[j]
+        offset_m, deviation_m = posture.offset_m[kind], posture.wander_m[kind]
+        squared = error[0] * error[0] + error[1] * error[1] + error[2] * error[2]
+        tail_factor = 1.0 + tail * squared
+        ahead_m = offset_m[0] + deviation_m[0] * tail_factor * error[0]
+        left_m = HAND[j] * (offset_m[1] + deviation_m[1] * tail_factor * error[1])
+        up_m = offset_m[2] + deviation_m[2] * tail_factor * error[2]
+        meant[j, 0] = joints[j, 0] + error_scale * (front.x * ahead_m - front.y * left_m)
+        meant[j, 1] = joints[j, 1] + error_scale * (front.y * ahead_m + front.x * left_m)
+        meant[j, 2] = joints[j, 2] + error_scale * up_m
 
 
 @kernel
@@ -360,15 +384,15 @@ def _draw_mistakes(
     common: Settings,
     overlooked: float,
 ) -> Mistakes:
-    """Return the detector's mistakes about a worker in an image.
+    """Draw the detector's mistakes about a worker in an image.
 
-    Each happens while a slow normal variable is in its lower tail, which is as large as the share
-    of the time in which the mistake happens.
+    A mistake happens while a slow normal variable is in its lower tail; the probability of the tail
+    is the share of the time in which the mistake happens.
 
     Args:
         state: state of the errors, which is changed.
         normals: (`N_NORMALS` J + `N_OF_BODY`,) standard normal numbers of the image.
-        n_seen: number of joints that are seen.
+        n_seen: number of seen joints.
         view: direction from which the camera sees the body [rad].
         here: tables of the worker's posture.
         common: tables that do not depend on the posture.
@@ -396,7 +420,7 @@ def _advance_mistake(state: Errors, which: int, normals: Floats, keeps: Floats) 
 
 @kernel
 def _between_views(angle: float) -> Between:
-    """Return the place of an angle [rad] between the `N_VIEWS` directions around the circle."""
+    """Return the position of an angle [rad] between the `N_VIEWS` directions around the body."""
     place = angle * N_VIEWS / (2.0 * math.pi)
     low = math.floor(place)
     return Between(int(low) % N_VIEWS, (int(low) + 1) % N_VIEWS, place - low)
@@ -411,10 +435,10 @@ def _advance_errors(
     Args:
         state: state of the errors, which is changed.
         normals: (`N_NORMALS` J + `N_OF_BODY`,) standard normal numbers of the image.
-        keep: coefficient of the autoregressions.
+        keep: coefficient of the autoregressive processes.
         view: direction from which the camera sees the body [rad].
         common: tables that do not depend on the posture.
-        off: (J, 2) is filled with the errors, in units of their size.
+        off: (J, 2) output: the errors, in units of their size.
     """
     renew = math.sqrt(1.0 - keep * keep)
     view_cos, view_sin = math.cos(view), math.sin(view)
@@ -444,18 +468,18 @@ def _write_keypoints(
     mistakes: Mistakes,
     factor: float,
 ) -> None:
-    """Write the reported pixels and confidences of a worker in an image.
+    """Compute the reported pixels and confidences of a worker in an image.
 
     Args:
-        px: (J, 2) is filled [px].
-        confidence: (J,) is filled.
+        px: (J, 2) output: the pixels [px].
+        confidence: (J,) output: the confidences.
         state: state of the errors.
-        view: how the camera sees the worker.
+        view: view of the worker in the camera.
         off: (J, 2) errors in units of their size.
         here: tables of the worker's posture.
         common: tables that do not depend on the posture.
         mistakes: mistakes of the detector.
-        factor: factor on the errors by the quality of the picture.
+        factor: factor on the errors due to the quality of the image.
     """
     side, badly = view.look[SIDE], _quantile(here.body, state.body)
     turn_cos, turn_sin = math.cos(view.look[TURN]), math.sin(view.look[TURN])
@@ -491,15 +515,15 @@ def _write_keypoints(
 
 @kernel
 def _lerp(a: float, b: float, part: float) -> float:
-    """Return the value at a share of the way from a to b."""
+    """Interpolate linearly between a (part 0) and b (part 1)."""
     return a + part * (b - a)
 
 
 @kernel
 def _quantile(known: Floats, normal: float) -> float:
-    """Return the value of a distribution at a normal deviate.
+    """Return the quantile of a distribution at a standard normal deviate.
 
-    The distribution is given by its quantiles at whole standard deviations, 0 in the middle.
+    The distribution is given by its quantiles at integer deviates, with 0 in the middle.
     """
     last = len(known) - 1
     place = min(max(normal + 0.5 * last, 0.0), float(last))

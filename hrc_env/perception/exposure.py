@@ -1,8 +1,8 @@
-"""Development of dark and dull pictures before the networks get them.
+"""Development: enhancement of dark and low-contrast images before they are passed to the networks.
 
-Grey levels between the dark and the bright parts are spread, and noise is smoothed. Pictures of
-usual contrast are returned unchanged, bit for bit. Blank pictures are returned unchanged as well:
-their noise must not be amplified into the shape of a person.
+The range of grey levels between the dark and bright parts is stretched, and noise is smoothed.
+Images of usual contrast are returned unchanged, bit for bit. Blank images are also returned
+unchanged, because amplified noise might look like a person.
 """
 
 import math
@@ -15,72 +15,72 @@ from numpy.typing import NDArray
 from hrc_env.core.typing import Floats, Image
 
 LEAST_CONTRAST = 3.0
-"""Least standard deviation of a colour channel, at size `COARSE_PX`, of a picture that is not blank
-[grey levels]."""
+"""Minimum standard deviation of a colour channel, at size `COARSE_PX`, of an image that is not
+blank [grey levels]."""
 LEAST_EDGES, EDGE_SHARE = 0.06, 0.98
-"""Least contrast of edges as a share of the span of grey levels, and the quantile of the local
-contrasts that is compared with it. Rooms have 0.1 and more, slopes 0.05 at most."""
+"""Minimum contrast of edges, as a share of the span of grey levels, and the quantile of local
+contrasts that is compared with it. Rooms have 0.1 and more, smooth gradients at most 0.05."""
 EDGE_PX, EDGE_SIGMA_PX, EDGE_BORDER_PX = 64, 2.0, 6
-"""Size of the picture in which edges are measured, deviation of the Gaussian that smooths it for
-comparison, and border that is left out [px]."""
+"""Size of the image in which edges are measured, standard deviation of the Gaussian that smooths it
+for comparison, and width of the border that is ignored [px]."""
 COARSE_PX = 32
-"""Size of the picture on which contrast is measured [px]; the noise of pixels averages out."""
+"""Size of the image in which contrast is measured, small enough to average out pixel noise [px]."""
 DULL, DULLEST = 75.0, 60.0
-"""Spans of grey levels below which a picture begins to be spread, and below which it is spread in
-full."""
+"""Spans of grey levels below which an image is partly stretched, and below which it is fully
+stretched."""
 SPAN = 150.0
-"""Grey levels between the dark and bright parts of a picture that was spread in full; the lab as it
-was built has 166."""
+"""Span between the grey levels of the dark and bright parts of a fully stretched image; the lab as
+built has 166."""
 ENDS = (0.01, 0.75, 0.99)
-"""Quantiles of the grey levels that count as dark, usual and bright."""
+"""Quantiles of the grey levels that are considered dark, usual and bright."""
 GLARE = 2.0
-"""Ratio to the usual grey level beyond which parts are windows and lamps, which may saturate."""
+"""Ratio to the usual grey level above which parts are windows or lamps, which may saturate."""
 MOST_NOISE = 20.0
-"""Greatest standard deviation to which noise is amplified [grey levels]."""
+"""Maximum standard deviation to which noise is amplified [grey levels]."""
 SMOOTHED = (4.0, 10.0)
 """Noise at which smoothing begins, and at which it is complete [grey levels]."""
 ROUNDING = math.sqrt(1.0 / 12.0)
-"""Standard deviation of the error of rounding to whole grey levels."""
+"""Standard deviation of the rounding error of grey levels."""
 UNEVEN: NDArray[np.float32] = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
-"""This filter amplifies noise six times and removes edges and slopes (Immerkaer 1996)."""
+"""Filter that removes edges and gradients and multiplies noise by six (Immerkaer 1996)."""
 NOISE_STEP = 4
-"""Factor by which a picture is reduced before its noise is measured."""
+"""Factor by which an image is reduced before its noise is measured."""
 OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0
-"""Ratio of an additional independent error, in units of the usual one, to the noise as a share of a
-dull picture's span; and the greatest factor on errors. Both are fitted to crops
+"""Additional independent error in low-contrast images, in units of the usual error, per noise as a
+share of the span; and the maximum factor on errors. Both were fitted to crops
 (`benchmarks.perception.dim`)."""
 USELESS = 0.165
-"""Share of noise in the span from which on people are missed in dull pictures."""
+"""Noise, as a share of the span, above which people are missed in low-contrast images."""
 SIGMA_PX = 0.6
-"""Deviation of the Gaussian that smooths noise [pixels of a crop]."""
+"""Standard deviation of the Gaussian that smooths noise [pixels of a crop]."""
 
 
 class Developed(NamedTuple):
-    """A picture for the networks."""
+    """An image for the networks."""
 
     picture: Image
-    """(n, n, 3) the crop itself, or a new picture."""
+    """(n, n, 3) the crop itself, or a developed copy."""
     doubt: float = 1.0
-    """Factor on the deviations of joints that are found in it; 1 at usual contrast."""
+    """Factor on the standard deviations of joints found in the image; 1 at usual contrast."""
     is_usable: bool = True
-    """Whether people would be found in it: it is neither blank nor mostly noise."""
+    """Whether people can be found in the image, that is, it is neither blank nor mostly noise."""
 
 
 class _Tones(NamedTuple):
-    """The range of a picture's grey levels."""
+    """The range of an image's grey levels."""
 
     dark: float
     """Grey level of the dark parts."""
     bright: float
     """Grey level of the bright parts, without windows and lamps."""
     grey: Image
-    """(n, n) the picture in grey levels."""
+    """(n, n) image in grey levels."""
 
     @property
     def span(self) -> float:
-        """Number of grey levels between the dark and the bright parts, at least 1."""
+        """Difference between the grey levels of the bright and the dark parts, at least 1."""
         return max(self.bright - self.dark, 1.0)
 
 
@@ -89,7 +89,7 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
 
     Args:
         crop: (n, n, 3) RGB.
-        mask: (n, n), 0 outside of the camera's image; None: the crop is inside.
+        mask: (n, n) 0 outside the camera's image; None if the crop is entirely inside.
     """
     size = (COARSE_PX, COARSE_PX)
     coarse = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
@@ -101,8 +101,8 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
 def has_edges(crop: Image) -> bool:
     """Return whether a crop (n, n, 3) shows any edge.
 
-    A covered lens, fog or a light that shines into the camera only show slopes, however large a
-    part of the grey levels these span.
+    A covered lens, fog or a light that shines into the camera only cause smooth gradients, whatever
+    range of grey levels these span.
     """
     tones = _tones(crop, None)
     size = (EDGE_PX, EDGE_PX)
@@ -113,11 +113,11 @@ def has_edges(crop: Image) -> bool:
 
 
 def develop(crop: Image, mask: Image | None = None) -> Developed:
-    """Spread the grey levels of a crop with less than the usual contrast, and smooth its noise.
+    """Stretch the grey levels of a crop of less than the usual contrast, and smooth its noise.
 
     Args:
         crop: (n, n, 3) RGB; it is not changed.
-        mask: (n, n), 0 outside of the camera's image; None: the crop is inside.
+        mask: (n, n) 0 outside the camera's image; None if the crop is entirely inside.
     """
     tones = _tones(crop, mask)
     if is_blank(crop, mask):
@@ -132,10 +132,10 @@ def develop(crop: Image, mask: Image | None = None) -> Developed:
 
 
 def measure_noise(grey: Image) -> float:
-    """Return the standard deviation of the noise of a picture (n, n) [grey levels].
+    """Estimate the standard deviation of the noise of an image (n, n) [grey levels].
 
-    It is estimated by the median of the picture's second differences at a reduced size, as enlarged
-    pictures have coarse noise.
+    The estimate is based on the median of the image's second differences at a reduced size, because
+    enlarged images have coarse noise.
     """
     n = len(grey) // NOISE_STEP
     small = cv2.resize(grey.astype(np.float32), (n, n), interpolation=cv2.INTER_AREA)
@@ -144,13 +144,13 @@ def measure_noise(grey: Image) -> float:
 
 
 def noise_factor(noise: float, span: float) -> float:
-    """Return the factor on the deviations of joints for a noise and a span [grey levels]."""
+    """Return the factor on joints' standard deviations for a noise and a span [grey levels]."""
     added = _ramp(span, DULL, DULLEST) * DOUBT * noise / max(span, 1.0)
     return min(math.hypot(1.0, added), MOST_DOUBT)
 
 
 def _tones(crop: Image, mask: Image | None) -> _Tones:
-    """Return the range of grey levels of a crop inside of its mask."""
+    """Return the range of grey levels of a crop inside its mask."""
     grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY), np.uint8)
     count: Floats = cv2.calcHist([grey], [0], mask, [256], [0, 256]).ravel().cumsum()
     dark, usual, bright = np.searchsorted(count, np.array(ENDS) * count[-1]).tolist()
@@ -158,7 +158,7 @@ def _tones(crop: Image, mask: Image | None) -> _Tones:
 
 
 def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
-    """Return a crop with its grey levels stretched by a gain, away from black and white."""
+    """Stretch the grey levels of a crop by a gain, in proportion to the room below and above."""
     added = (gain - 1.0) * tones.span
     first = tones.dark - added * tones.dark / max(255.0 - tones.span, 1.0)
     levels = first + gain * (np.arange(256) - tones.dark)
@@ -166,7 +166,7 @@ def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
 
 
 def _smooth(picture: Image, noise: float) -> Image:
-    """Return a picture smoothed as far as its noise [grey levels] demands."""
+    """Smooth an image to a degree that depends on its noise [grey levels]."""
     share = _ramp(noise, *SMOOTHED)
     if share == 0.0:
         return picture
@@ -175,6 +175,6 @@ def _smooth(picture: Image, noise: float) -> Image:
 
 
 def _ramp(value: float, none: float, whole: float) -> float:
-    """Return a share that rises smoothly from 0 at `none` to 1 at `whole`."""
+    """Return a weight that rises smoothly from 0 at `none` to 1 at `whole`."""
     share = min(max((value - none) / (whole - none), 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)

@@ -1,10 +1,10 @@
-"""Whole images of a calibrated rig as an `ImageSource`."""
+"""An `ImageSource` of whole images of a calibrated rig."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
@@ -21,7 +21,7 @@ class Frames:
             cameras are calibrated.
 
     Raises:
-        ConfigError: there is no such image for a camera.
+        ConfigError: an image is missing, or has the wrong size or type.
     """
 
     def __init__(self, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> None:
@@ -29,7 +29,7 @@ class Frames:
         if not (is_array or isinstance(images, list | tuple)) or len(images) != len(cameras):
             raise ConfigError(
                 f"There must be one image for each of {len(cameras)} cameras, or an object with "
-                f"crop(camera_index, window), got {described(images)}."
+                f"crop(camera_index, window), got {describe(images)}."
             )
         for c, (camera, image) in enumerate(zip(cameras, images, strict=True)):
             size = (camera.height_px, camera.width_px, 3)
@@ -38,10 +38,10 @@ class Frames:
                 raise ConfigError(
                     f"The image of camera {c} must be an array of uint8 with shape {size}, as the "
                     f"camera is calibrated: rows, columns, RGB from 0 to 255; got "
-                    f"{described(image)}. Convert the image, or calibrate for its size."
+                    f"{describe(image)}. Convert the image, or calibrate for its size."
                 )
         self.images = list(images)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's image, (256, 256, 3)."""
+        """Return a window (256, 256, 3) of a camera's image."""
         return crop_window(self.images[camera_index], window)

@@ -1,7 +1,7 @@
-"""Lens distortion in front of a renderer that draws pinhole images, and behind the detector.
+"""Lens distortion of rendered pinhole images, and its correction for detected keypoints.
 
-A window of a distorted image is resampled from a pinhole image, which is turned to the window's
-middle and just wide enough to cover it. Trackers get keypoints in pinhole pixels.
+A window of a distorted image is resampled from a pinhole image that is rotated to the window's
+centre and just wide enough to cover the window. Trackers receive keypoints in pinhole pixels.
 """
 
 import functools
@@ -25,23 +25,23 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import to_image
 
 WIDEST = float(np.tan(np.radians(78.0)))
-"""Half width of a pinhole image, beyond which a window is black [focal lengths]."""
+"""Maximum half width of a pinhole image; beyond it, windows are black [focal lengths]."""
 MAPS_KEPT = 64
-"""Number of windows with resampling maps that are kept."""
+"""Number of windows with cached resampling maps."""
 
 
 class PinholeRenderer(Protocol):
-    """A renderer that poses a scene and draws pinhole images of it."""
+    """A renderer of pinhole images of a scene."""
 
     size_px: int
-    """Side of its images [px]."""
+    """Side of the rendered images [px]."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Pose the scene for the views that follow."""
+        """Pose the robot and the workers for the following views."""
         ...
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Return a window of a pinhole camera's image, (size, size, 3) RGB, top row first."""
+        """Render a window of a pinhole camera's image, (size, size, 3) RGB, top row first."""
         ...
 
 
@@ -50,20 +50,20 @@ class _Resampling:
     """A pinhole image that covers a window of a distorted image, and the map between them."""
 
     camera: PinholeCamera
-    """Camera turned to the window's middle, with K = 1."""
+    """Camera that points at the window's centre, with K = 1."""
     window: Roi
-    """The part of its image that is drawn."""
+    """Window of the pinhole image that is rendered."""
     x: NDArray[np.float32]
-    """(size, size) column in the drawn image for every pixel, counted from pixel centres."""
+    """(size, size) column in the rendered image for every pixel, from the first pixel's centre."""
     y: NDArray[np.float32]
-    """(size, size) row in the drawn image for every pixel, counted from pixel centres."""
+    """(size, size) row in the rendered image for every pixel, from the first pixel's centre."""
 
 
 class LensRenderer:
-    """An `ImageSource` of images as the lenses of a rig distort them.
+    """An `ImageSource` of rendered images with the distortion of a rig's lenses.
 
     Args:
-        renderer: draws the pinhole images.
+        renderer: renderer of the pinhole images.
         cameras: the rig.
     """
 
@@ -71,11 +71,11 @@ class LensRenderer:
         self.renderer, self.cameras = renderer, tuple(cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's present image, upright, (size, size, 3) RGB."""
+        """Render a window of a camera's present image, upright, (size, size, 3) RGB."""
         return self.view(self.cameras[camera_index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Return a window of the image of any camera, upright, (size, size, 3) RGB."""
+        """Render a window of the image of any camera, upright, (size, size, 3) RGB."""
         if camera.lens is None:
             return self.renderer.view(camera, window)
         maps = _resample(camera, window, self.renderer.size_px)
@@ -86,10 +86,10 @@ class LensRenderer:
 
 
 def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Keypoints:
-    """Return keypoints (B, C, ...) in pinhole pixels, given those in pixels of the images.
+    """Convert keypoints (B, C, ...) from image pixels to pinhole pixels.
 
-    Standard deviations grow with the magnification; joints without a place in a pinhole image are
-    missing.
+    Standard deviations are multiplied by the magnification. Joints that have no position in a
+    pinhole image are removed.
     """
     if all(camera.lens is None for camera in cameras):
         return found
@@ -106,7 +106,7 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
 
 @functools.lru_cache(maxsize=MAPS_KEPT)
 def _resample(camera: PinholeCamera, window: Roi, size: int) -> _Resampling | None:
-    """Return how a window is resampled; None if the lens images nothing in it."""
+    """Return the resampling of a window, or None if the lens images nothing in it."""
     middles = (np.arange(size) + 0.5) / size
     places = np.stack(np.meshgrid(middles, middles), -1)
     px = to_image(places, window)
@@ -131,7 +131,7 @@ def _resample(camera: PinholeCamera, window: Roi, size: int) -> _Resampling | No
 
 
 def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
-    """Return R_world_from_view: forward to the middle of the rays, upright with the window."""
+    """Return R_world_from_view: z along the mean of the rays, and y downwards in the window."""
     forward = np.asarray(np.nanmean(ray.reshape(-1, 3), 0), float)
     forward /= np.linalg.norm(forward)
     c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
@@ -142,5 +142,5 @@ def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
 
 
 def _pixels(place: Floats, side: float, size: int) -> NDArray[np.float32]:
-    """Return pixels, counted from their centres, of places in [0, side]; far outside of NaN."""
+    """Convert positions in [0, side] to pixels, counted from pixel centres; NaN is far outside."""
     return np.nan_to_num(place / side * size - 0.5, nan=-size).astype(np.float32)

@@ -1,8 +1,8 @@
-"""The BlazePose networks as plain functions from an image to raw tensors, on LiteRT or OpenVINO.
+"""The BlazePose networks as functions from an image to raw tensors, on LiteRT or OpenVINO.
 
-Load one function per thread. LiteRT gives the same bits on every machine with the same
-instructions. The official landmark file also computes a segmentation mask and world landmarks, 40 %
-of its time, which `prune` drops.
+Each thread must load separate functions. LiteRT gives bitwise equal results on all machines with
+the same instruction set. The official landmark network also computes a segmentation mask and world
+landmarks, which take 40 % of its time; `prune` removes them.
 """
 
 import functools
@@ -14,7 +14,7 @@ import flatbuffers
 from ai_edge_litert import schema_py_generated as schema
 from ai_edge_litert.interpreter import Interpreter
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Tensor
 from hrc_env.perception import vino
 from hrc_env.perception.vino import Network
@@ -25,14 +25,14 @@ DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256
 """Side of the landmark stage's input [px]."""
 NETWORKS = ("lite", "full", "heavy")
-"""Landmark networks, from the fastest to the most exact."""
+"""Landmark networks, from the fastest to the most accurate."""
 DETECTOR_OUTPUTS = ("Identity", "Identity_1")
-"""Outputs of the official graph: boxes (1, 2254, 12), score logits (1, 2254, 1)."""
+"""Names of the detector's outputs: boxes (1, 2254, 12) and score logits (1, 2254, 1)."""
 LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
-"""Outputs of the official graph: landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64,
-39)."""
+"""Names of the landmark network's outputs: landmarks (1, 195), presence score (1, 1) and heatmaps
+(1, 64, 64, 39)."""
 RUNTIMES = ("litert", "openvino", "auto")
-"""Runtimes: LiteRT (the default), OpenVINO (an extra), and OpenVINO if installed, else LiteRT."""
+"""Names of the runtimes; "auto" is OpenVINO, an optional extra, if it is installed, else LiteRT."""
 
 
 class PersonTensors(NamedTuple):
@@ -50,9 +50,9 @@ class LandmarkTensors(NamedTuple):
     points: Tensor
     """(39, 5) x, y, z in crop pixels, logits of visibility and presence."""
     presence: float
-    """Person flag in [0, 1]."""
+    """Presence score of a person in [0, 1]."""
     heat: Tensor
-    """(64, 64, 39) heatmap logits."""
+    """(64, 64, 39) logits of the heatmaps."""
 
 
 PersonDetector: TypeAlias = Callable[[Tensor], PersonTensors]
@@ -62,9 +62,9 @@ Landmarker: TypeAlias = Callable[[Tensor], LandmarkTensors]
 
 
 def resolve_runtime(name: str) -> str:
-    """Return the runtime of a name of `RUNTIMES`; `ConfigError` for one unknown or missing."""
+    """Resolve a name of `RUNTIMES`; raise `ConfigError` if it is unknown or not installed."""
     if name not in RUNTIMES:
-        raise unknown("runtime", name, RUNTIMES)
+        raise make_unknown_name_error("runtime", name, RUNTIMES)
     if name == "openvino":
         vino.check_installed()
     if name == "auto":
@@ -73,7 +73,7 @@ def resolve_runtime(name: str) -> str:
 
 
 def load_person_detector(runtime: str = "litert") -> PersonDetector:
-    """Return the detector stage; `WeightsError` if its weights are missing."""
+    """Load the detector stage; raise `WeightsError` if its weights are missing."""
     run = _load("pose_detection", DETECTOR_OUTPUTS, runtime)
 
     def detect(image: Tensor) -> PersonTensors:
@@ -84,7 +84,7 @@ def load_person_detector(runtime: str = "litert") -> PersonDetector:
 
 
 def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarker:
-    """Return a landmark stage of `NETWORKS`; `WeightsError` if its weights are missing."""
+    """Load a landmark stage of `NETWORKS`; raise `WeightsError` if its weights are missing."""
     run = _load(f"pose_landmark_{network}", LANDMARK_OUTPUTS, runtime)
 
     def landmark(image: Tensor) -> LandmarkTensors:
@@ -95,7 +95,7 @@ def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarke
 
 
 def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
-    """Return a network as a function from an image to the named outputs."""
+    """Load a network as a function from an image to the named outputs."""
     path = find_weights(weights)
     if resolve_runtime(runtime) == "openvino":
         return vino.load(path, outputs)
@@ -104,12 +104,12 @@ def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
 
 @functools.lru_cache(maxsize=4)
 def _read_pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
-    """Return a pruned model, kept for the interpreters of all threads: it takes half a second."""
+    """Read and prune a model, which takes half a second; the result is cached for all threads."""
     return prune(path.read_bytes(), outputs)
 
 
 def load_tflite(content: bytes, outputs: Sequence[str]) -> Network:
-    """Return the content of a .tflite file as a function from an image to the named outputs."""
+    """Load a network from the content of a .tflite file, as a function of an image."""
     net = Interpreter(model_content=content, num_threads=1)
     net.allocate_tensors()
     into = net.get_input_details()[0]["index"]
@@ -125,7 +125,7 @@ def load_tflite(content: bytes, outputs: Sequence[str]) -> Network:
 
 
 def prune(content: bytes, outputs: Sequence[str]) -> bytes:
-    """Return a .tflite model (operators in topological order) without unused operators."""
+    """Remove unused operators from a .tflite model with operators in topological order."""
     model: Any = schema.ModelT.InitFromPackedBuf(content, 0)  # generated code, loosely typed
     graph = model.subgraphs[0]
     by_name = {graph.tensors[k].name.decode(): int(k) for k in graph.outputs}
@@ -145,7 +145,7 @@ def prune(content: bytes, outputs: Sequence[str]) -> bytes:
 
 
 def _keep_tensors(model: Any, kept: list[int]) -> None:
-    """Renumber tensors and buffers so that only `kept` remain (-1 marks an absent input)."""
+    """Remove all tensors and buffers except `kept`, and renumber them (-1 is an absent input)."""
     graph = model.subgraphs[0]
     place = {old: new for new, old in enumerate(kept)}
     place[-1] = -1

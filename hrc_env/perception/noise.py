@@ -1,8 +1,8 @@
-"""Differences between the network's joints and ours: their standard deviations and mean offsets.
+"""Mean offsets and standard deviations between the network's joints and those of our skeleton.
 
-The real pipeline and its emulator use the same numbers. A hip of BlazePose is 17 mm above ours, and
-60 mm ahead of it in a bent person. Trackers follow the network's joints; estimates are of
-ours.
+The real pipeline and its emulator use the same numbers. BlazePose's hips are 17 mm above ours and,
+in a bent person, 60 mm ahead of them. Trackers track the network's joints; published estimates are
+of our joints.
 """
 
 from collections.abc import Sequence
@@ -26,24 +26,24 @@ from hrc_env.perception.calibration import (
 from hrc_env.perception.outline import STANDING, Facing, facing, mix, novelty_m, posture_of
 
 ERROR: Floats = read_calibration().sigma
-"""(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
-joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
+"""(P, K, V) standard deviation of each image coordinate, as a share of the stature, by posture and
+kind of joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
 FARTHEST_M = 0.25
-"""Distance from known poses beyond which the uncertainty of a body grows no further [m]."""
+"""Distance from known poses above which the uncertainty of a body grows no further [m]."""
 
 
 class Offsets(NamedTuple):
-    """The part of a calibration that turns the network's joints into ours."""
+    """The part of a calibration that converts the network's joints to ours."""
 
     tables: Floats
-    """(P, K * 6) mean offset (3) [m] and its variance (3) [m^2] by posture and kind of joint; both
-    ahead, to the joint's own side, up."""
+    """(P, K * 6) mean offset (3) [m] and its variance (3) [m^2], by posture and kind of joint, in
+    the directions ahead, to the joint's side of the body, and up."""
     poses: Floats
-    """(J, 3, M) known poses, as of `outline.pose_of`."""
+    """(J, 3, M) known poses, in the coordinates of `outline.pose_of`."""
     near_m: float
-    """Distance from the nearest of these up to which a body is not new [m]."""
+    """Distance from the nearest known pose up to which a body counts as known [m]."""
     novel: Floats
-    """(K,) factor on the square of the distance beyond `near_m`, an addition to the standard
+    """(K,) factor on the squared distance beyond `near_m`; the product is added to the standard
     deviation [1/m]."""
 
 
@@ -58,11 +58,11 @@ def sigma_px(
     Args:
         confidence: (..., J) reported visibilities.
         stature_px: stature at the joints' distance, broadcast to `confidence` [px].
-        posture: shares of the postures, as of `outline.posture_of`.
+        posture: shares of the postures, as returned by `outline.posture_of`.
         known: table `sigma` of a calibration.
 
     Returns:
-        (..., J), infinite where the confidence is 0 [px].
+        (..., J) standard deviations, infinite where the confidence is 0 [px].
     """
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
@@ -78,8 +78,8 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
 
     Args:
         confidence: reported visibility.
-        visibility: (V,) visibilities at which the deviation is given.
-        error: (V,) the deviation there.
+        visibility: (V,) visibilities at which the standard deviation is given.
+        error: (V,) standard deviation at each of them.
     """
     if not confidence > 0.0:
         return np.inf
@@ -93,17 +93,17 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
 
 
 def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> PoseEstimate:
-    """Return an estimate of the network's joints as one of ours.
+    """Convert an estimate of the network's joints to one of our joints.
 
-    Means move by the mean offset of the network's joints (`offset_m`). Covariances grow by the
-    variance of this offset over time and between bodies (`wander_m`, `between_m`), which no number
-    of cameras and frames averages out, and by the distance of the body from all known poses
-    (`novel`), as it is new or wrong. Priors of workers without a track stay as they are, and so do
-    velocities.
+    Means are shifted by the mean offset of the network's joints (`offset_m`). Covariances increase
+    by the variance of this offset over time and between bodies (`wander_m`, `between_m`), which
+    cameras and frames do not average out. They also increase with the distance of the body from all
+    known poses (`novel`), because such a pose is new or wrong. Velocities, and priors of workers
+    without a track, do not change.
 
     Args:
         estimate: (B, W, ...) estimate of the network's joints.
-        known: a calibration; None: the package's.
+        known: a calibration; None for that of the package.
     """
     known = known or read_calibration()
     variance_m2 = known.wander_m**2 + known.between_m**2
@@ -118,14 +118,14 @@ def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> Pose
 def _correct_joints(
     mean: Points3, cov: Covariances3, velocity: Velocities3, tracked: Bools, offsets: Offsets
 ) -> None:
-    """Turn the network's joints into ours, in place.
+    """Convert the network's joints to ours, in place.
 
     Args:
-        mean: (B, W, J, 3) is changed [m].
-        cov: (B, W, J, 3, 3) is changed [m^2].
-        velocity: (B, W, J, 3) [m/s].
-        tracked: (B, W) the workers that are corrected.
-        offsets: the calibration.
+        mean: (B, W, J, 3) means of the positions, which are changed [m].
+        cov: (B, W, J, 3, 3) covariances, which are changed [m^2].
+        velocity: (B, W, J, 3) velocities [m/s].
+        tracked: (B, W) mask of the workers to convert.
+        offsets: offsets of the calibration.
     """
     row = np.empty(offsets.tables.shape[1])
     of_kind = row.reshape(-1, 6)
@@ -150,11 +150,11 @@ def _correct_joint(
     """Subtract the mean offset of a joint, and add the variance of the offset.
 
     Args:
-        joint: (3,) is changed [m].
-        cov: (3, 3) is changed [m^2].
+        joint: (3,) mean position, which is changed [m].
+        cov: (3, 3) covariance, which is changed [m^2].
         front: direction to the front of the body.
-        offset: (6,) mean offset [m] and variance [m^2]: ahead, to the joint's own side, up.
-        hand: -1 for a right joint, else 1.
+        offset: (6,) mean offset [m] and variance [m^2]: ahead, to the joint's side, up.
+        hand: -1 for a right joint, 1 for others.
     """
     x, y = front.x, front.y
     ahead, left, up = offset[0], hand * offset[1], offset[2]

@@ -1,4 +1,4 @@
-"""A body's posture and facing: the few numbers on which a detector's errors depend.
+"""Posture and facing of bodies, on which a detector's errors depend.
 
 Joints (J, 3) are in the order of `core.skeleton.JOINTS`: nose 0; left and right shoulder 1 2, elbow
 3 4, wrist 5 6, hip 7 8, knee 9 10, ankle 11 12. Their z axis is up.
@@ -13,26 +13,26 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Points3, Velocities3
 
 UPRIGHT, FOLDED = 0.15, 0.50
-"""Loss of height of the shoulders above the ankles, as a share of the greatest height, at which a
-body begins to count as folded, and at which it counts fully. Walking is below .12, bending or
-kneeling above .3."""
+"""Reduction of the shoulders' height above the ankles, as a share of the full height, at which a
+body begins to count as folded, and at which it counts fully. It is below 0.12 in walking and above
+0.3 in bending or kneeling."""
 SQUATS, KNEELS = 0.40, 0.10
-"""Height of the lower knee above its ankle, as a share of the shank, at which a folded body begins
-to count as kneeling, and at which it counts fully. Squatting is above .5, a knee on the ground at
-0."""
+"""Height of the lower knee above its ankle, as a share of the shank's length, at which a folded
+body begins to count as kneeling, and at which it counts fully. It is above 0.5 in squatting and 0
+with a knee on the ground."""
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
 """Mean speeds of the joints at which a body begins to count as walking, and at which it counts
-fully [m/s]. Hammering is at the first, slow walking above the second."""
+fully [m/s]. Hammering has the first speed, slow walking is above the second."""
 HANGS, RAISED = 0.10, 0.25
-"""Loss of height of a shoulder above its wrist, as a share of the arm's length, at which hands
-begin to count as busy, and at which they count fully. Swinging arms are at the first, carrying
-above the second."""
+"""Reduction of a shoulder's height above its wrist, as a share of the arm's length, at which hands
+begin to count as busy, and at which they count fully. Swinging arms have the first value, carrying
+is above the second."""
 LEAN_RAD = math.radians(30.0)
-"""Angle from the vertical beyond which a torso is bent [rad]; the error of the network `full` is
-then half as large again."""
+"""Angle from the vertical above which a torso is bent [rad]; the errors of the network `full` are
+then 50 % larger."""
 LOW_HIPS = 0.75
 """Height of the hips above the lower ankle, as a share of the leg's length, below which a body
-squats or kneels; in a walk it stays above .9."""
+squats or kneels; in walking, it stays above 0.9."""
 
 
 class Facing(NamedTuple):
@@ -45,27 +45,27 @@ class Facing(NamedTuple):
 
 
 class Posture(NamedTuple):
-    """The shares by which a body counts as each of `calibration.POSTURES`; their sum is 1."""
+    """A body's posture as weights of `calibration.POSTURES`; their sum is 1."""
 
     standing: float
-    """Share of a body that stands with free hands."""
+    """Weight of the posture "standing, with free hands"."""
     walking: float
-    """Share of a body that walks with free hands."""
+    """Weight of the posture "walking, with free hands"."""
     handling: float
-    """Share of an upright body with busy hands."""
+    """Weight of the posture "upright, with busy hands"."""
     folded: float
-    """Share of a body that bends or squats."""
+    """Weight of the posture "bending or squatting"."""
     kneeling: float
-    """Share of a body with a knee on the ground."""
+    """Weight of the posture "kneeling, with a knee on the ground"."""
 
 
 STANDING = Posture(1.0, 0.0, 0.0, 0.0, 0.0)
-"""The posture of a body that only stands."""
+"""The posture of a standing body with free hands."""
 
 
 @kernel
 def facing(joints: Points3) -> Facing:
-    """Return the direction to the front of a body (J, 3); +x where there is none."""
+    """Return the direction to the front of a body (J, 3), or +x if it is not defined."""
     left_x = joints[1, 0] - joints[2, 0] + joints[7, 0] - joints[8, 0]
     left_y = joints[1, 1] - joints[2, 1] + joints[7, 1] - joints[8, 1]
     length = math.sqrt(left_x * left_x + left_y * left_y)
@@ -76,7 +76,7 @@ def facing(joints: Points3) -> Facing:
 
 @kernel
 def folding(joints: Points3) -> float:
-    """Return how much a body (J, 3) is folded, from 0 (upright) to 1 (folded up)."""
+    """Return the degree to which a body (J, 3) is folded, from 0 (upright) to 1 (folded)."""
     height = 0.0
     for side in range(2):
         height += joints[1 + side, 2] - joints[11 + side, 2]
@@ -86,7 +86,7 @@ def folding(joints: Points3) -> float:
 
 @kernel
 def kneeling(joints: Points3) -> float:
-    """Return how much a body (J, 3) kneels if it is folded, from 0 (no knee on the ground) to 1."""
+    """Return the degree to which a folded body (J, 3) kneels, from 0 to 1 (knee on the ground)."""
     least = 1.0
     for side in range(2):
         knee, ankle = 9 + side, 11 + side
@@ -107,13 +107,13 @@ def speed(velocity: Velocities3) -> float:
 
 @kernel
 def stepping(mean_speed_m_s: float) -> float:
-    """Return how much a body walks by the mean speed of its joints, from 0 (it stands) to 1."""
+    """Return the degree of walking from 0 (standing) to 1, given the mean speed of the joints."""
     return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
 
 
 @kernel
 def handling(joints: Points3) -> float:
-    """Return how busy the hands of a body (J, 3) are, from 0 (arms hang) to 1."""
+    """Return the degree to which a body's (J, 3) hands are busy, from 0 (hanging arms) to 1."""
     most = 0.0
     for side in range(2):
         shoulder, elbow, wrist = 1 + side, 3 + side, 5 + side
@@ -125,7 +125,7 @@ def handling(joints: Points3) -> float:
 
 @kernel
 def weigh(folds: float, kneels: float, hands: float, steps: float) -> Posture:
-    """Return the posture of a body.
+    """Combine the measures of a body's posture to weights.
 
     Args:
         folds: result of `folding`.
@@ -149,7 +149,7 @@ def posture_of(joints: Points3, velocity: Velocities3) -> Posture:
 
 @kernel
 def mix(posture: Posture, tables: Floats, out: Floats) -> None:
-    """Write the mean (N,) of the tables (P, N) of all postures, weighted by a body's posture."""
+    """Compute the mean `out` (N,) of the postures' tables (P, N), weighted by a body's posture."""
     out[:] = 0.0
     for p in range(len(posture)):
         if posture[p] > 0.0:
@@ -159,9 +159,9 @@ def mix(posture: Posture, tables: Floats, out: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def pose_of(joints: Points3) -> Floats:
-    """Return a body's joints (J, 3) from the middle of its hips: ahead, left and up.
+    """Return a body's joints (J, 3) relative to mid-hip in body axes: ahead, left and up.
 
-    The unit is the length of its trunk and leg.
+    The unit is the length of the body's trunk and leg.
     """
     front = facing(joints)
     pose, length_m = np.empty((len(joints), 3)), _length_m(joints)
@@ -178,19 +178,19 @@ def pose_of(joints: Points3) -> Floats:
 def novelty_m(joints: Points3, poses: Floats) -> float:
     """Return the distance of a body (J, 3) from the nearest of M poses (J, 3, M) [m].
 
-    The distance is the root mean square over the joints; poses are as of `pose_of`.
+    The distance is the root mean square over the joints; poses are in the coordinates of `pose_of`.
     """
     pose, squared = pose_of(joints), np.zeros(poses.shape[2])
     for j in range(len(pose)):
         for i in range(3):
-            for m in range(len(squared)):  # innermost, so that it is done for several at once
+            for m in range(len(squared)):  # innermost loop, so that it is vectorized
                 squared[m] += (pose[j, i] - poses[j, i, m]) ** 2
     return _length_m(joints) * math.sqrt(squared.min() / len(pose))
 
 
 @kernel
 def _length_m(joints: Points3) -> float:
-    """Return the length of a body's trunk and leg (J, 3), the mean of both sides [m]."""
+    """Return the length of the trunk and leg of a body (J, 3), as the mean of both sides [m]."""
     length = 0.0
     for side in range(2):
         shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
@@ -209,12 +209,12 @@ def _distance(joints: Points3, i: int, k: int) -> float:
 
 @kernel
 def view_angle(joints: Points3, front: Facing, eye: Floats) -> float:
-    """Return the direction from which an eye sees a body: 0 from its front, pi / 2 from its left.
+    """Return the viewing direction of a body: 0 from its front, pi / 2 from its left.
 
     Args:
-        joints: (J, 3) [m].
+        joints: (J, 3) joints of the body [m].
         front: result of `facing`.
-        eye: (3,) [m].
+        eye: (3,) position of the camera [m].
 
     Returns:
         Angle in (-pi, pi] [rad].
@@ -225,9 +225,9 @@ def view_angle(joints: Points3, front: Facing, eye: Floats) -> float:
 
 
 def is_folded(joints_world: Points3) -> bool:
-    """Return whether a body (J, 3) bends, squats or kneels; NaN does not count.
+    """Return whether a body (J, 3) bends, squats or kneels; it is False if joints are NaN.
 
-    Its joints then hide each other, and the network's errors are much larger.
+    The joints of such a body occlude each other, and the network's errors are much larger.
     """
     shoulders, hips, knees, ankles = (joints_world[k : k + 2] for k in (1, 7, 9, 11))
     torso = shoulders.mean(0) - hips.mean(0)

@@ -1,8 +1,8 @@
-"""Plausibility of detections: networks mistake robots for people now and then.
+"""Plausibility checks of detections, because networks occasionally mistake robots for people.
 
-If several cameras show a body, its bones must be about as long as people's. If only one does, the
-body must stand upright on the floor, where its line of sight meets it: its size then tells whether
-it is too large.
+If several cameras detect a body, its bones must have plausible lengths. If only one camera detects
+it, it must stand upright at the point where the line of sight to its feet meets the floor, and its
+heights there must be plausible.
 """
 
 from collections.abc import Sequence
@@ -17,20 +17,20 @@ from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.lenses import pinhole_keypoints
 
 MIN_VISIBILITY = 0.6
-"""Least mean confidence of the joints of a person in one camera alone."""
+"""Minimum mean confidence of the joints of a person detected by only one camera."""
 NEAR_FLOOR_M = 0.5
-"""Greatest distance of a standing person from the points of the floor [m]."""
+"""Maximum distance of a standing person from the nearest of the floor's points [m]."""
 GATE_SIGMA = 4.0
-"""Greatest reprojection error of cameras that agree on a joint, in standard deviations."""
+"""Maximum reprojection error of cameras that agree on a joint, in standard deviations."""
 BONE_RATIO = 1.42
-"""Greatest ratio of a bone's length to an adult's mean, or of the mean to it, that is plausible."""
+"""Maximum plausible ratio between a bone's length and the mean of adults, in either direction."""
 MIN_BONES = 0.65
-"""Least share of all bones that must be plausible."""
+"""Minimum share of all bones that must have plausible lengths."""
 LEVELS = tuple(
     [JOINT[f"{side}_{name}"] for side in ("left", "right")]
     for name in ("ankle", "knee", "hip", "shoulder")
 )
-"""Pairs of joints with heights that show whether a person stands."""
+"""Pairs of joints that are used, by their mean heights, to check if a person stands."""
 ANKLE_M = 0.1
 """Height of the ankles of a standing person above the floor [m]."""
 LEVELS_M: Floats = np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])
@@ -48,11 +48,11 @@ def is_person(
 
     Args:
         px: (C, J, 2) joints in pixels of the images.
-        confidence: (C, J) their confidences; 0 where a camera does not show them.
-        sigma_px: (C, J) their standard deviations [px].
+        confidence: (C, J) confidences of the joints; 0 in cameras that do not show them.
+        sigma_px: (C, J) standard deviations of the pixels [px].
         cameras: the rig.
-        floor_world: (N, 3) points of the floor where people may be [m]; None: unknown, and
-            detections of one camera count only if there is no other camera.
+        floor_world: (N, 3) points of the floor where people may be [m]. If None, detections by a
+            single camera are accepted only if there is no other camera.
     """
     shown = np.flatnonzero(confidence.any(1)).tolist()
     if len(shown) > 1:
@@ -69,9 +69,9 @@ def has_body(
     """Return whether joints have the bones of a person.
 
     Args:
-        px: (C, J, 2) joints in pixels of the images of two cameras or more.
-        confidence: (C, J) their confidences.
-        sigma_px: (C, J) their standard deviations [px].
+        px: (C, J, 2) joints in pixels of the images of two or more cameras.
+        confidence: (C, J) confidences of the joints.
+        sigma_px: (C, J) standard deviations of the pixels [px].
         cameras: the rig.
     """
     found = Keypoints(*(each[None, :, None] for each in (px, confidence, sigma_px)))
@@ -89,7 +89,7 @@ def is_standing(
 
     Args:
         joints_px: (J, 2) joints in pixels of the image.
-        confidence: (J,) their confidences.
+        confidence: (J,) confidences of the joints.
         camera: the camera.
         floor_world: (N, 3) points of the floor [m].
     """

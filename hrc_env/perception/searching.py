@@ -1,8 +1,8 @@
-"""Search for people without a prior: in whole images, and for the same person in several.
+"""Search for people in whole images, without a prediction, and their association across cameras.
 
-The detector stage needs a person to be a third of its window high. Where the floor is known,
-windows are as large as people on it need; else as large as the image. The lines of sight to one
-person's hips meet; those to two people, or to a mistake, rarely do.
+The detector stage finds people that fill at least a third of its window's height. If the floor is
+known, the windows are sized for people on it; otherwise they are as large as the image. The lines
+of sight to the hips of one person meet; those to different people or to false detections rarely do.
 """
 
 import functools
@@ -29,35 +29,36 @@ from hrc_env.perception.exposure import develop, has_edges
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
-"""Greatest angle of view of a search window [rad]; in wider ones people are too small for the
+"""Maximum angle of view of a search window [rad]; in wider windows, people are too small for the
 detector stage."""
 STATURE_M = 1.75
-"""Stature of people for the layout of search windows [m]."""
+"""Assumed stature of people for the layout of search windows [m]."""
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker, as a share of the side of BlazePose's window around the worker."""
 ROOM = 2.1
-"""Side of a search window in heights of a person."""
+"""Side of a search window, in units of a person's height."""
 FITTING = (1.25, 2.8)
-"""Least and greatest side of a window in which the detector stage finds most people, in heights of
-a person."""
+"""Minimum and maximum side of windows in which the detector stage finds most people, in units of a
+person's height."""
 MEETING_M = 0.3
-"""Greatest distance from a point of lines of sight that show the same hips there [m]."""
+"""Maximum distance of a line of sight to the hips from a point at which it shows the same hips
+[m]."""
 SIDE_M = (1.1, 3.6)
-"""Least and greatest side of the detector stage's window at a person's distance [m]: of a person
-who is folded up, and of a tall one who reaches up."""
+"""Minimum and maximum side of the detector stage's window at a person's distance: for a crouching
+person, and for a tall person with raised arms [m]."""
 SAME = 0.2
-"""Distance of the middles of two windows of one camera, as a share of the side, below which both
-show the same person."""
+"""Distance between the centres of two windows in one camera, as a share of the side, below which
+both show the same person."""
 MIN_CROSSING = 0.1
-"""Sine of the smallest angle between two lines that fixes a point."""
+"""Sine of the smallest angle between two lines at which their closest points are well defined."""
 Candidates: TypeAlias = Sequence[Sequence[Roi]]
-"""(C,) windows of the people that each camera found."""
+"""(C,) windows of the people found in each camera."""
 Views: TypeAlias = list[Roi | None]
-"""(C,) window of one person in each camera; None where there is none."""
+"""(C,) window of a person in each camera; None for cameras without a window."""
 
 
 class ImageSource(Protocol):
-    """A source of the present images of all cameras: a renderer, a camera, a recorded film."""
+    """A source of the present images of all cameras, such as a renderer, cameras or videos."""
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """Return a window of a camera's present image, upright, (256, 256, 3) RGB of uint8."""
@@ -65,26 +66,26 @@ class ImageSource(Protocol):
 
 
 class Sighting(NamedTuple):
-    """A person in whole images."""
+    """A person found by a search of whole images."""
 
     hips_world: Points3
-    """(3,) middle of the hips [m]; if one camera alone detects the person, by the size of an
-    upright person."""
+    """(3,) midpoint of the hips [m]; if only one camera detects the person, it is estimated from
+    the size of an upright person."""
     windows: Views
-    """(C,) window of each camera that detects the person."""
+    """(C,) window of the person in each camera; None in cameras that do not detect the person."""
     n_cameras: int
-    """Number of these cameras."""
+    """Number of cameras that detect the person."""
 
 
 class Found(NamedTuple):
-    """A person in a search window."""
+    """A person found in a search window."""
 
     camera: int
     """Index of the camera."""
     score: float
     """Confidence in [0, 1]."""
     window: Roi
-    """Region of interest [px]."""
+    """Region of interest around the person [px]."""
 
 
 class SearchResult(NamedTuple):
@@ -93,40 +94,40 @@ class SearchResult(NamedTuple):
     camera: int
     """Index of the camera."""
     is_usable: bool
-    """Whether people would be found in the picture: it is not blank, mostly noise or without
-    edges."""
+    """Whether people can be found in the image, that is, it has edges and is neither blank nor
+    mostly noise."""
     found: list[Found]
-    """The people that the detector stage found."""
+    """People that the detector stage has found."""
 
 
 class _People(NamedTuple):
-    """People on the floor in an image."""
+    """Hypothetical people on the floor, projected into an image."""
 
     middle_px: Points2
-    """(N, 2) middles of their bodies [px]."""
+    """(N, 2) centres of the bodies [px]."""
     height_px: Floats
-    """(N,) their heights [px]."""
+    """(N,) heights of the bodies [px]."""
 
 
 class _Support(NamedTuple):
-    """The windows that show hips at a point."""
+    """The windows of people with hips at a point."""
 
     windows: Views
-    """(C,) the nearest such window of each camera."""
+    """(C,) nearest such window of each camera."""
     n_cameras: int
     """Number of cameras with such a window."""
     error_m: float
-    """Sum of the distances of their lines of sight from the point [m]."""
+    """Sum of the distances between these windows' lines of sight and the point [m]."""
 
 
 SearchJob: TypeAlias = Callable[[PersonDetector], SearchResult]
-"""Search of one window with a detector stage."""
+"""Function that searches one window with a detector stage."""
 
 
 def search_jobs(
     source: ImageSource, windows: Sequence[Sequence[Roi]], which: Sequence[int]
 ) -> Iterator[SearchJob]:
-    """Draw one search window after the other, and yield the search of each.
+    """Render the search windows one by one, and yield a search job for each.
 
     Args:
         source: the present images.
@@ -140,7 +141,7 @@ def search_jobs(
 
 
 def _search_window(detect: PersonDetector, c: int, crop: Image, window: Roi) -> SearchResult:
-    """Return the people in the crop (256, 256, 3) of a window of camera c."""
+    """Find the people in the crop (256, 256, 3) of a window of camera c."""
     developed = develop(crop)
     is_usable = developed.is_usable and has_edges(crop)
     people = find_people(detect, developed.picture)
@@ -149,7 +150,7 @@ def _search_window(detect: PersonDetector, c: int, crop: Image, window: Roi) -> 
 
 
 def crop_image(source: ImageSource, c: int, window: Roi) -> Image:
-    """Return a window of camera c, (256, 256, 3); `ConfigError` unless it is 8-bit RGB."""
+    """Return a window (256, 256, 3) of camera c; raise `ConfigError` unless it is 8-bit RGB."""
     crop = source.crop(c, window)
     if not isinstance(crop, np.ndarray) or crop.dtype != np.uint8:
         got = f"{crop.dtype} array" if isinstance(crop, np.ndarray) else type(crop).__name__
@@ -168,18 +169,18 @@ def crop_image(source: ImageSource, c: int, window: Roi) -> Image:
 
 
 def find_people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
-    """Return the people that the detector stage finds in a crop, best first."""
+    """Find the people in a crop with the detector stage, best first."""
     return blazepose.decode_people(*detect(blazepose.detector_input(crop).image))
 
 
 def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) -> list[Roi]:
-    """Return the search windows of a camera, upright squares in pixels of the image.
+    """Return the search windows of a camera, which are upright squares in pixels of the image.
 
     Args:
         camera: the camera.
-        floor_world: (N, 3) points where people may stand [m]: as few windows as show all of these
-            people large enough. None: unknown; windows overlap, and are as large as image and lens
-            (`SEARCH_RAD`) allow.
+        floor_world: (N, 3) points where people may stand [m]; a small number of windows then shows
+            all of these people in sufficient size. If None, the windows overlap and are as large as
+            image and lens (`SEARCH_RAD`) allow.
     """
     if floor_world is not None:
         return _cover_people(_project_people(camera, floor_world))
@@ -191,7 +192,7 @@ def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) ->
 
 
 def _project_people(camera: PinholeCamera, floor_world: Points3) -> _People:
-    """Return the people at points (N, 3) of the floor [m] inside of the image of a camera."""
+    """Project people at points (N, 3) of the floor [m], and return those inside the image."""
     heights_m = np.array([[0.0], [0.5], [1.0]]) * (0.0, 0.0, STATURE_M)
     px, depth_m = project(camera.P[None], (floor_world + heights_m[:, None])[None])
     feet, middle, head = image_from_pinhole(camera, px[0, 0])
@@ -200,9 +201,10 @@ def _project_people(camera: PinholeCamera, floor_world: Points3) -> _People:
 
 
 def _cover_people(people: _People) -> list[Roi]:
-    """Return few windows so that each of the people is well inside of one that fits.
+    """Return a small set of windows, so that each person is fully inside one of suitable size.
 
-    Windows around each person are candidates; the one that covers the most people comes first.
+    The candidates are windows around each person; the one that covers the most people is selected
+    repeatedly.
     """
     middle_px, height_px = people.middle_px, people.height_px
     side_px = ROOM * height_px
@@ -220,7 +222,7 @@ def _cover_people(people: _People) -> list[Roi]:
 
 
 def drop_duplicates(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
-    """Return one window for each person of each camera (C,), best first: search windows overlap."""
+    """Remove duplicates from overlapping search windows; return people by camera, best first."""
     kept: list[list[Roi]] = [[] for _ in range(n_cameras)]
     for each in sorted(found, key=lambda one: -one.score):
         if not any(is_same_person(each.window, other) for other in kept[each.camera]):
@@ -229,23 +231,24 @@ def drop_duplicates(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
 
 
 def _middles(length_px: int, side_px: float) -> list[float]:
-    """Return the middles of spans that together cover a length, at most half a side apart [px]."""
+    """Return the centres of intervals that cover a length, at most half an interval apart [px]."""
     n = 1 + math.ceil(2 * (length_px / side_px - 1))
     return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
 
 
 def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Views:
-    """Return the windows of the person with the best agreement of cameras.
+    """Return the windows of the person on which the cameras agree best.
 
-    The lines of sight to the hips in these windows meet best. Of several cameras, two must have
-    found the person, at a plausible size; a single camera's first candidate counts.
+    The lines of sight to the hips in these windows meet most closely. In a rig of several cameras,
+    at least two must have found the person, at a plausible size; in a rig of one camera, its first
+    candidate is used.
 
     Args:
-        candidates: (C,) windows of the people that each camera found, best first.
+        candidates: (C,) windows of the people found in each camera, best first.
         cameras: the rig.
 
     Returns:
-        (C,) window in each camera, None where it has not found the person.
+        (C,) window in each camera; None in cameras that have not found the person.
     """
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
@@ -256,7 +259,8 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
 def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Sighting]:
     """Return the people among candidates (C,).
 
-    Those with several cameras that agree come first, best first, then those of one camera alone.
+    People on which several cameras agree come first, in the order of agreement, followed by those
+    found by only one camera.
     """
     found: list[Sighting] = []
     while (agreed := _find_agreed(candidates, cameras)) is not None:
@@ -270,7 +274,7 @@ def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[
 
 
 def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
-    """Return the person with the best agreement of most cameras; None unless two agree."""
+    """Return the person on which most cameras agree, or None if no two cameras agree."""
     best, best_rank = None, (1, 0.0)
     for point in _find_crossings(candidates, cameras):
         support = _find_support(point, candidates, cameras)
@@ -281,7 +285,7 @@ def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Si
 
 
 def _locate_by_size(camera: PinholeCamera, window: Roi) -> Points3:
-    """Return the place (3,) at which an upright person has a window of this size [m]."""
+    """Return the position (3,) at which an upright person has a window of this size [m]."""
     (x, y), half_px = window.centre_px, window.side_px / 2
     along, edge = rays(camera, np.array([[x, y], [x, y + half_px]]))
     half_m = STATURE_M / STATURE_OF_SIDE / 2
@@ -292,7 +296,7 @@ def _locate_by_size(camera: PinholeCamera, window: Roi) -> Points3:
 def propose_people(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
     """Yield the windows (C,) of possible people among candidates (C,), best first.
 
-    People that several cameras agree on come first, then those that only one has found.
+    People on which several cameras agree come first, followed by those found by only one camera.
     """
     left = candidates
     while any(agreed := agreed_windows(left, cameras)):
@@ -304,7 +308,7 @@ def propose_people(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
 
 
 def exclude_people(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
-    """Return the candidates (C,) without those in a window (C,) of other people."""
+    """Return the candidates (C,) without those that are in the windows (C,) of other people."""
     return [
         [window for window in found if not any(is_same_person(window, w[c]) for w in others)]
         for c, found in enumerate(candidates)
@@ -312,12 +316,12 @@ def exclude_people(candidates: Candidates, others: Sequence[Sequence[Roi | None]
 
 
 def is_same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
-    """Return whether two windows of one camera have their middles (the hips) in one place.
+    """Return whether the centres (the hips) of two windows in one camera nearly coincide.
 
     Args:
         window: a window.
-        other: another one; None: there is none.
-        share: greatest distance of the middles, as a share of the other's side.
+        other: another window, or None.
+        share: maximum distance between the centres, as a share of the side of `other`.
     """
     if other is None:
         return False
@@ -325,7 +329,7 @@ def is_same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
 
 
 def _find_crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Points3]:
-    """Yield the points (3,) where lines of sight of two cameras pass each other [m]."""
+    """Yield the points (3,) at which lines of sight of two cameras are closest [m]."""
     lines = [
         (c, camera.eye_world, rays(camera, np.array(window.centre_px)))
         for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True))
@@ -346,7 +350,7 @@ def _find_crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) ->
 def _find_support(
     point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
 ) -> _Support:
-    """Return the candidates (C,) that show hips at a point (3,) [m]."""
+    """Find the candidates (C,) that show hips at a point (3,) [m]."""
     windows: Views = [None] * len(cameras)
     error_m = 0.0
     for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):

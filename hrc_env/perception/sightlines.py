@@ -1,4 +1,4 @@
-"""Lines of sight: how cameras see workers, one environment after the other."""
+"""Kernels for the views of workers in cameras, which process one environment after another."""
 
 from typing import Annotated, NamedTuple
 
@@ -16,10 +16,10 @@ from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, Window, fit_window
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
-"""How a camera sees a joint: free, behind something, outside the image, behind the camera."""
+"""Visibility of a joint: seen, occluded, outside the image, or behind the camera."""
 SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
-"""How a camera sees a worker: side [px] and turn [rad] of the window around the body, direction
-from which the camera sees it (`outline.view_angle`) [rad], and four measures of the posture by the
+"""Columns that describe the view of a worker: side [px] and rotation [rad] of the window around the
+body, viewing direction (`outline.view_angle`) [rad], and four measures of the posture from the
 functions of `outline` with these names."""
 
 
@@ -27,7 +27,7 @@ class ImageCamera:
     """A camera with its lens and its image."""
 
     P: Annotated[Floats, (3, 4)]
-    """Projection to pinhole pixels."""
+    """Projection matrix to pinhole pixels."""
     eye: Annotated[Floats, (3,)]
     """Optical centre in the world frame [m]."""
     size_px: Annotated[Floats, (2,)]
@@ -37,22 +37,22 @@ class ImageCamera:
     centre_px: Annotated[Floats, (2,)]
     """Principal point cx and cy [px]."""
     lens: Annotated[Floats, (FOLD + 1,)]
-    """Row of the lens, as of `lens.lens_row`."""
+    """Row of the lens, as returned by `lens.lens_row`."""
     has_lens: bool
     """Whether the lens distorts the image."""
 
 
 class WorkerView:
-    """A worker in the image of a camera."""
+    """The view of a worker in the image of a camera."""
 
     uv: Annotated[Points2, (N_JOINTS, 2)]
-    """Joints in the image, as the lens distorts it [px]."""
+    """Joints in pixels of the image, including lens distortion [px]."""
     depth: Annotated[Floats, (N_JOINTS,)]
-    """Distance of each joint along the camera's axis [m]."""
+    """Depth of each joint along the camera's axis [m]."""
     sight: Annotated[Ints, (N_JOINTS,)]
-    """How the camera sees each joint: `SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
+    """Visibility of each joint: `SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
     look: Annotated[Floats, (N_LOOK,)]
-    """How the camera sees the worker, by the columns `SIDE` to `STEPPING`."""
+    """View of the worker, in the columns `SIDE` to `STEPPING`."""
 
 
 CAMERA = dtype_of(ImageCamera)
@@ -62,10 +62,10 @@ WORKER_VIEW = dtype_of(WorkerView)
 
 
 class World(NamedTuple):
-    """Workers and their surroundings in B environments."""
+    """The workers and their surroundings in B environments."""
 
     joints: Points3
-    """(B, W, J, 3) joints of the workers [m]."""
+    """(B, W, J, 3) positions of the workers' joints [m]."""
     velocity: Velocities3
     """(B, W, J, 3) velocities of the joints [m/s]."""
     capsules: Capsules
@@ -75,7 +75,7 @@ class World(NamedTuple):
     still: Floats
     """(G, `shapes.WIDTH`) shapes that never move."""
     moving: Floats
-    """(B, M, `shapes.WIDTH`) shapes that are carried."""
+    """(B, M, `shapes.WIDTH`) movable shapes, such as carried objects."""
     robot: Capsules
     """(B, N, 2, 3) capsules of the robot [m]."""
     robot_radius: Floats
@@ -84,13 +84,13 @@ class World(NamedTuple):
 
 @kernel(makes_arrays=True)
 def view_workers(world: World, rig: Records1[ImageCamera], sight: Ints, look_of: Floats) -> None:
-    """Write how cameras see joints and workers, without errors.
+    """Compute the views of joints and workers in cameras, without errors.
 
     Args:
         world: workers and surroundings in B environments.
         rig: (C,) cameras.
-        sight: (B, C, W, J) is filled with `SEEN` to `BEHIND`.
-        look_of: (B, C, W, `N_LOOK`) is filled with the columns `SIDE` to `STEPPING`.
+        sight: (B, C, W, J) output: visibility of the joints, `SEEN` to `BEHIND`.
+        look_of: (B, C, W, `N_LOOK`) output: the columns `SIDE` to `STEPPING`.
     """
     occluders, views = make_room(world), np.empty(1, WORKER_VIEW)
     for b in range(len(world.joints)):
@@ -99,7 +99,7 @@ def view_workers(world: World, rig: Records1[ImageCamera], sight: Ints, look_of:
             joints = world.joints[b, w]
             front = outline.facing(joints)
             for c in range(len(rig)):
-                view = views[0]  # within the loop: a record does not keep its array alive
+                view = views[0]  # inside the loop, because a record does not keep its array alive
                 view_worker(rig[c], joints, joints, occluders, view)
                 view.look[VIEW] = outline.view_angle(joints, front, rig[c].eye)
                 view.look[FOLDING] = outline.folding(joints)
@@ -111,7 +111,7 @@ def view_workers(world: World, rig: Records1[ImageCamera], sight: Ints, look_of:
 
 @kernel(makes_arrays=True)
 def make_room(world: World) -> Occluders:
-    """Return a table of the shapes that never move, with room for all others of an environment."""
+    """Return a table of the static shapes, with empty rows for an environment's moving shapes."""
     n_bodies, n_body = world.radius.shape[1:]
     n_more = len(world.robot_radius) + world.moving.shape[1]
     return make_occluders(world.still, n_more, n_bodies * n_body)
@@ -119,7 +119,7 @@ def make_room(world: World) -> Occluders:
 
 @kernel
 def place_moving(table: Floats, world: World, b: int) -> None:
-    """Write the moving shapes of environment b into a table, behind those that never move."""
+    """Copy the moving shapes of environment b to a table, after the static shapes."""
     row, n_body = len(world.still), world.radius.shape[2]
     set_capsules(table, row, world.robot[b], world.robot_radius)
     row += len(world.robot_radius)
@@ -133,17 +133,17 @@ def place_moving(table: Floats, world: World, b: int) -> None:
 def view_worker(
     camera: ImageCamera, joints: Points3, meant: Points3, occluders: Occluders, view: WorkerView
 ) -> int:
-    """Project a worker into an image, and find the joints that are hidden.
+    """Project a worker into an image, and determine the visibility of the joints.
 
     Args:
         camera: the camera.
-        joints: (J, 3) the joints, which may be hidden [m].
-        meant: (J, 3) the points that are projected [m]: where the detector places the joints.
+        joints: (J, 3) true joints, which are tested for occlusion [m].
+        meant: (J, 3) positions at which the detector places the joints, which are projected [m].
         occluders: all shapes of the environment.
-        view: is filled, except the columns of `look` after `TURN`.
+        view: output: the view, except the columns of `look` after `TURN`.
 
     Returns:
-        The number of joints that are seen.
+        The number of seen joints.
     """
     uv, depth = view.uv, view.depth
     view.look[SIDE], view.look[TURN] = project_worker(camera, meant, uv, depth)
@@ -164,9 +164,9 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 
     Args:
         camera: the camera.
-        joints: (J, 3) [m].
-        uv: (J, 2) is filled with pixels of the image.
-        depth: (J,) is filled with distances along the camera's axis [m].
+        joints: (J, 3) positions of the joints [m].
+        uv: (J, 2) output: the joints in pixels of the image [px].
+        depth: (J,) output: the depths along the camera's axis [m].
     """
     for j in range(len(joints)):
         x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
@@ -182,26 +182,35 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 
 @kernel
 def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
-    """Distort pinhole pixels (J, 2) in place; return the magnification.
+    """Distort pinhole pixels in place, and return the mean magnification of the pinhole image.
 
-    That is how many times longer the pinhole shows the body.
+    The magnification is the ratio of lengths in the pinhole image to lengths in the image of the
+    lens, at the joint. Joints nearer than `MIN_DEPTH_M` are left as they are and do not count.
+
+    Args:
+        camera: the camera.
+        uv: (J, 2) pixels of the joints without distortion, replaced by those with distortion [px].
+        depth: (J,) distances along the camera's axis [m].
+
+    Returns:
+        The mean over the joints; 1 if none counts.
     """
-    fx, fy = camera.focal_px[0], camera.focal_px[1]
-    cx, cy = camera.centre_px[0], camera.centre_px[1]
-    total, n = 0.0, 0
+    focal_x, focal_y = camera.focal_px[0], camera.focal_px[1]
+    centre_x, centre_y = camera.centre_px[0], camera.centre_px[1]
+    total, n_joints = 0.0, 0
     for j in range(len(depth)):
         if depth[j] >= MIN_DEPTH_M:
-            x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
+            x, y = (uv[j, 0] - centre_x) / focal_x, (uv[j, 1] - centre_y) / focal_y
             total += magnification_at(camera.lens, x, y)
-            n += 1
-            x, y = distort_point(camera.lens, x, y)
-            uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
-    return total / n if n > 0 else 1.0
+            n_joints += 1
+            lens_x, lens_y = distort_point(camera.lens, x, y)
+            uv[j, 0], uv[j, 1] = lens_x * focal_x + centre_x, lens_y * focal_y + centre_y
+    return total / n_joints if n_joints > 0 else 1.0
 
 
 @kernel
 def _locate_pixel(camera: ImageCamera, pixel: Floats, depth: float) -> int:
-    """Return `SEEN` of a pixel (2,) in the image, else `OUTSIDE` or `BEHIND`."""
+    """Return `SEEN` for a pixel (2,) inside the image, otherwise `OUTSIDE` or `BEHIND`."""
     if depth < MIN_DEPTH_M:
         return BEHIND
     for i in range(2):

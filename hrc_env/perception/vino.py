@@ -1,7 +1,8 @@
-"""Networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
+"""Inference of networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
 
-It computes only what the wanted outputs need. Where the processor multiplies 16-bit floats (bf16:
-AVX512_BF16 or AMX) it takes half of LiteRT's time, and landmarks move by a quarter of a pixel.
+OpenVINO evaluates only the operators that the requested outputs need. On processors with 16-bit
+floating-point arithmetic (bf16: AVX512_BF16 or AMX), it takes half of LiteRT's time, and landmarks
+differ by a quarter of a pixel.
 """
 
 import functools
@@ -17,7 +18,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Tensor
 
 Network: TypeAlias = Callable[[Tensor], list[Tensor]]
-"""Function from an image (H, W, 3) to copies of the named outputs, for one thread at a time."""
+"""Function from an image (H, W, 3) to copies of the requested outputs; it is not thread-safe."""
 INSTALL = 'pip install "hrc_env[openvino]"'
 """Command that installs OpenVINO."""
 
@@ -28,7 +29,7 @@ def is_installed() -> bool:
 
 
 def check_installed() -> None:
-    """Raise `ConfigError` where OpenVINO is missing."""
+    """Raise `ConfigError` if OpenVINO is not installed."""
     if not is_installed():
         raise ConfigError(
             f'runtime="openvino" needs OpenVINO, which is not installed: {INSTALL}, or choose '
@@ -37,17 +38,17 @@ def check_installed() -> None:
 
 
 def precision() -> str:
-    """Return the precision of networks: "bf16" if the processor has it, else "f32"."""
+    """Return the precision of networks: "bf16" if the processor supports it, else "f32"."""
     return "bf16" if "BF16" in _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES") else "f32"
 
 
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
-    """Return a .tflite file as a function from an image to named outputs, on one thread.
+    """Load a .tflite file as a function from an image to named outputs, which uses one thread.
 
     Args:
         path: path of the file.
         outputs: names of the outputs.
-        bits: precision, "f32" or "bf16"; None: `precision()`.
+        bits: precision, "f32" or "bf16"; None for `precision()`.
     """
     whole = _core().read_model(path)
     wanted = [out.node for name in outputs for out in whole.outputs if name in out.names]
@@ -68,14 +69,14 @@ def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network
 
 @functools.cache
 def _core() -> Any:
-    """Return OpenVINO's core, one for the process."""
+    """Return OpenVINO's core, which is created once per process."""
     return _openvino().Core()
 
 
 def _openvino() -> Any:
-    """Return the package without its telemetry.
+    """Import OpenVINO without its telemetry.
 
-    Telemetry would keep usage counts in the home folder.
+    The telemetry would store usage counts in the home folder.
     """
     check_installed()
     sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]

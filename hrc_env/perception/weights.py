@@ -1,8 +1,8 @@
-"""Weights of the pose networks, which are fetched when needed and kept in the user's cache.
+"""Weights of the pose networks, which are fetched when needed and stored in the user's cache.
 
-They are Google's BlazePose (Apache-2.0), and are checked by every process. The detector and `full`
-are in the official `mediapipe` wheel, which is never installed; `lite` and `heavy` are in Google's
-package on npm.
+They are Google's BlazePose (Apache-2.0), and every process verifies their checksums. The detector
+and `full` are part of the official `mediapipe` wheel, which is never installed; `lite` and `heavy`
+are part of Google's package on npm.
 """
 
 import functools
@@ -17,19 +17,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core import folders
-from hrc_env.core.errors import DownloadError, WeightsError, unknown
+from hrc_env.core.errors import DownloadError, WeightsError, make_unknown_name_error
 from hrc_env.perception.downloads import download_file, download_wheel, read_member
 
 log = logging.getLogger("hrc_env.weights")
 
 WHEEL = "mediapipe==0.10.21"
-"""Last release of mediapipe with the detector and `full`."""
+"""Requirement of the last release of mediapipe that contains the detector and `full`."""
 WHEEL_BYTES = 35_622_638.0
-"""Size of that wheel [bytes]."""
+"""Size of the wheel of mediapipe [bytes]."""
 TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
-"""Package `@mediapipe/pose`, with all landmark networks."""
+"""Address of the npm package `@mediapipe/pose`, which contains all landmark networks."""
 SETUP = "python -m hrc_env setup"
-"""Command that fetches weights."""
+"""Command that fetches the default weights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +37,13 @@ class WeightsFile:
     """An official file of weights in an archive."""
 
     archive: str
-    """Requirement or address of the archive."""
+    """Requirement (wheel) or address (tarball) of the archive."""
     member: str
     """Path of the file in the archive."""
     size_bytes: int
     """Size of the file [bytes]."""
     sha256: str
-    """Checksum of the file."""
+    """SHA-256 checksum of the file, in hexadecimal."""
 
 
 WEIGHTS: dict[str, WeightsFile] = {
@@ -72,7 +72,7 @@ WEIGHTS: dict[str, WeightsFile] = {
         "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
     ),
 }
-"""All files by name."""
+"""All weights files, by name."""
 ALWAYS = ("pose_detection", "pose_landmark_full")
 """Names of the weights of the default networks."""
 
@@ -84,10 +84,10 @@ def setup_command(names: Iterable[str]) -> str:
 
 
 def cache_dir() -> Path:
-    """Return the folder of the weights.
+    """Return the folder in which weights are stored.
 
-    It is $HRC_ENV_CACHE, or `hrc_env` in the user's caches, or a temporary folder if these cannot
-    be written.
+    It is $HRC_ENV_CACHE if that is set, else `hrc_env` in the user's cache folder, or a temporary
+    folder if the latter is not writable.
     """
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
@@ -97,10 +97,10 @@ def cache_dir() -> Path:
 def find_weights(name: str) -> Path:
     """Return the path of a weights file.
 
-    Raises `WeightsError` if it is missing or not the official one.
+    Raises `WeightsError` if the file is missing or not the official one.
     """
     if name not in WEIGHTS:
-        raise unknown("weights", name, WEIGHTS)
+        raise make_unknown_name_error("weights", name, WEIGHTS)
     path = _path_of(name)
     if not path.is_file():
         raise WeightsError(
@@ -112,7 +112,7 @@ def find_weights(name: str) -> Path:
 
 
 def _path_of(name: str) -> Path:
-    """Return the path of a weights file, which may be in a cache that is read-only."""
+    """Return the path of a weights file, which may be in a read-only cache."""
     usual, file = folders.usual_cache(), f"{name}.tflite"
     if not os.environ.get("HRC_ENV_CACHE") and usual is not None and (usual / file).is_file():
         return usual / file
@@ -120,10 +120,10 @@ def _path_of(name: str) -> Path:
 
 
 def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
-    """Return the paths of weights by name, and download those that are missing.
+    """Download missing weights, and return the paths of all requested ones by name.
 
     Raises:
-        WeightsError: they cannot be downloaded or written.
+        WeightsError: weights cannot be downloaded or written.
     """
     names = list(dict.fromkeys(names))
     found = {name: path for name in names if (path := _found(name)) is not None}
@@ -143,7 +143,7 @@ def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
 
 
 def _found(name: str) -> Path | None:
-    """Return the path of a weights file; None if it is missing or not the official one."""
+    """Return the path of a weights file, or None if it is missing or not the official one."""
     try:
         return find_weights(name)
     except WeightsError:
@@ -175,12 +175,12 @@ def _fetch(archive: str, names: list[str], folder: Path) -> None:
 
 @functools.cache
 def _verify(name: str, path: Path, _mtime_ns: int, _size: int) -> None:
-    """Raise `WeightsError` unless a file is the official one (success is remembered)."""
+    """Raise `WeightsError` unless a file is the official one; success is cached."""
     _check(name, path.read_bytes(), str(path))
 
 
 def _check(name: str, content: bytes, origin: str) -> None:
-    """Raise `WeightsError` unless the content is that of the official file."""
+    """Raise `WeightsError` unless `content` is that of the official file."""
     expected = WEIGHTS[name]
     checksum = hashlib.sha256(content).hexdigest()
     if checksum != expected.sha256:
@@ -192,7 +192,7 @@ def _check(name: str, content: bytes, origin: str) -> None:
 
 
 def _unpack(place: Path, name: str) -> None:
-    """Write a file of an archive into the cache, after it has been checked."""
+    """Extract a weights file from an archive, verify it, and store it in the cache."""
     try:
         content = read_member(place, WEIGHTS[name].member)
     except (zipfile.BadZipFile, tarfile.TarError, EOFError, KeyError) as error:
@@ -206,7 +206,7 @@ def _unpack(place: Path, name: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder, delete=False) as part:
             part.write(content)
-        os.replace(part.name, folder / f"{name}.tflite")  # whole or not at all
+        os.replace(part.name, folder / f"{name}.tflite")  # atomic: the whole file or nothing
     except OSError as error:
         raise WeightsError(
             f"Could not write the weights into {folder}: {error}. "

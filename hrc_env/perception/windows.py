@@ -1,8 +1,8 @@
-"""Windows: the crop around the predicted joints of a worker.
+"""Windows of crops around the predicted joints of workers.
 
-As in BlazePose's detector stage, it is around the middle of the hips, as large as the body, with
-the torso upright. The landmark stage tolerates a shift of 0.2 of the side, a scale of 0.8 to 1.25,
-and a turn of 20 degrees.
+As in BlazePose's detector stage, a window is centred at mid-hip, as large as the body, and rotated
+so that the torso is upright. The landmark stage tolerates a shift of 0.2 of the side, a scale from
+0.8 to 1.25, and a rotation of 20 degrees.
 """
 
 import math
@@ -23,44 +23,45 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import ROI_MARGIN, wrap_angle
 
 MIN_DEPTH_M = 0.5
-"""Least distance of a worker's torso from the camera's plane [m]; there is no window for nearer
-ones."""
+"""Minimum depth of a worker's torso in the camera's frame; nearer workers have no window [m]."""
 MIN_JOINTS_INSIDE = 6
-"""Least number of joints in the image, of 15, for which there is a window."""
+"""Minimum number of joints (of 15) inside the image for a worker to have a window."""
 MIN_REACH_M = 0.85
-"""Least radius of a window [m]: that of an upright person, as a folded person may rise."""
+"""Minimum radius of a window: that of an upright person, because a folded person may stand up
+[m]."""
 MIN_TORSO_M = 0.15
-"""Length of the torso in the image below which it is seen end on [m], and has no direction: the
-window is then upright in the image."""
+"""Length of the projected torso below which its direction is undefined, because it is seen end on;
+the window is then upright in the image [m]."""
 CROWN = 0.8
-"""Reach of the hat beyond the nose, as a share of the distance from the shoulders to the nose."""
+"""Extent of the head and hat beyond the nose, as a share of the distance from the shoulders to the
+nose."""
 HAND = 0.6
-"""Reach of the hands beyond the wrists, as a share of the distance from elbow to wrist."""
+"""Extent of the hands beyond the wrists, as a share of the distance from elbow to wrist."""
 STEADY_SHIFT, STEADY_SCALE, STEADY_TURN_RAD = 0.10, 0.15, 0.2
-"""Shift (share of the side), scale (logarithm) and turn [rad] of the predicted window below which
-the last one is kept: half of the landmark stage's tolerance."""
+"""Differences between the predicted and the last window below which the last window is kept: shift
+(share of the side), scale (logarithm) and rotation [rad]; half the landmark stage's tolerances."""
 
 
 class Window(NamedTuple):
     """Size and orientation of the window around a worker."""
 
     side_px: float
-    """Length of its sides [px]."""
+    """Length of the window's sides [px]."""
     turn_rad: float
-    """Turn of its upright, clockwise in the image [rad]."""
+    """Rotation of the window from upright, clockwise in the image [rad]."""
 
 
 def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamera) -> Roi | None:
-    """Return the window around joints.
+    """Return the window around the joints of a worker.
 
     Args:
         joints_px: (J, 2) joints in pinhole pixels.
-        depth_m: (J,) their distances along the camera's axis [m].
+        depth_m: (J,) depths of the joints along the camera's axis [m].
         camera: the camera.
 
     Returns:
-        The window in pixels of the image; None if the worker is behind the camera, very near to it
-        or outside of its image.
+        The window in pixels of the image, or None if the worker is behind the camera, very near to
+        it or outside its image.
     """
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None
@@ -79,13 +80,13 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
 
 @kernel
 def fit_window(uv: Points2, depth: Floats, px_per_m: float, nearest_m: float) -> Window:
-    """Return the window around joints.
+    """Return the size and orientation of the window around the joints of a worker.
 
     Args:
         uv: (J, 2) joints in pixels of the image.
-        depth: (J,) their distances along the camera's axis [m].
+        depth: (J,) depths of the joints along the camera's axis [m].
         px_per_m: scale of the image at the worker's distance [px/m].
-        nearest_m: least distance of joints that count [m].
+        nearest_m: minimum depth of joints that are considered [m].
     """
     hip_x, hip_y = 0.5 * (uv[7, 0] + uv[8, 0]), 0.5 * (uv[7, 1] + uv[8, 1])
     neck_x, neck_y = 0.5 * (uv[1, 0] + uv[2, 0]), 0.5 * (uv[1, 1] + uv[2, 1])
@@ -117,7 +118,7 @@ def _squared_norm(x: float, y: float) -> float:
 def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
     """Return the last window if it still fits the predicted one, else the predicted one.
 
-    Steady crops give steady landmarks, and need not be drawn again.
+    Unchanged crops give steady landmarks and need not be rendered again.
     """
     if kept is None or wanted is None:
         return wanted

@@ -1,1 +1,1 @@
-"""The perception levels that have cameras: predict, look, update."""
+"""Pipelines of the perception levels: they predict, detect and update the estimates of workers."""

@@ -1,7 +1,7 @@
-"""People beyond the workers' slots, as found by searches and remembered.
+"""Detection and memory of bystanders, that is, people without a slot.
 
-Searches of whole images go on while all workers are tracked: every `EVERY` steps, and more often
-while there are other people. The slots belong to the people nearest to the robot.
+While all workers are tracked, whole images are searched every `EVERY` steps, and more often while
+there are bystanders. The slots are given to the people nearest to the robot.
 """
 
 import math
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.errors import needed
+from hrc_env.core.errors import require
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Capsules, Ints, Points3
 from hrc_env.core.vacancy import MOST_OTHERS, Others, no_others
@@ -28,52 +28,53 @@ from hrc_env.pipeline.sensor_input import Windows
 EVERY = 12
 """Number of steps between searches while all workers are tracked."""
 APART_M = 0.35
-"""Distance from the hips of a tracked worker below which hips are the worker's [m]."""
+"""Distance from a tracked worker's hips below which detected hips belong to the worker [m]."""
 ROBOT_M = 0.15
-"""Distance from the axis of a robot's link below which hips are no person's [m]."""
+"""Distance from the axis of a robot's link below which detected hips are not a person's [m]."""
 TAKEN_M = 0.45
-"""Distance from a worker's track below which a confirmed person that is not found again is the
-worker [m]."""
+"""Distance from a worker's track below which a confirmed bystander that is not found again is
+considered to be the worker [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
-"""Distance within which a person is found again, and its growth with every step [m]."""
+"""Greatest distance between two sightings of the same person, and its growth per step [m]."""
 ALONE = 3
-"""Number of searches with detections by one camera alone that confirm a person."""
+"""Number of searches after which a person detected by only one camera is confirmed."""
 MISSES, MISSES_ALONE = 12, 4
-"""Number of searches in a row without a person after which the person is forgotten: a confirmed
-one, and another one."""
+"""Numbers of consecutive searches without a detection after which a person is forgotten: for a
+confirmed person, and for one that is not confirmed."""
 HIGHEST_M = 1.6
 """Greatest height of a person's hips above the floor [m]."""
 BESIDE = 0.4
-"""Distance from the middle of a worker's window, as a share of its side, within which a person whom
-one camera alone detects may be the worker."""
+"""Distance from the centre of a worker's window, as a share of its side, within which a person
+detected by only one camera may be the worker."""
 NEARER_M = 0.3
-"""Difference of distances from the robot beyond which a person gets the slot of a worker [m]."""
+"""Difference of the distances from the robot above which a nearer person gets a worker's slot
+[m]."""
 GIVEN_UP = 6
-"""Number of steps for which that worker is then searched for as if without a track; estimators
-restart after three that contradict them."""
+"""Number of steps for which the track of a given-up slot is ignored, and the slot's worker is
+searched for; estimators restart after three contradicting steps."""
 HIPS = [JOINT["left_hip"], JOINT["right_hip"]]
-"""Joints with a worker's hips in their middle."""
+"""Indices of the hip joints; their midpoint is the position of a worker's hips."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bystander:
-    """A person beyond the slots."""
+    """A person without a slot."""
 
     hips_world: Points3
-    """(3,) middle of the hips [m]."""
+    """(3,) midpoint of the hips [m]."""
     age: int
     """Number of steps since the last detection."""
     n_seen: int
-    """Number of searches that showed the person."""
+    """Number of searches that detected the person."""
     n_missed: int
-    """Number of the last searches in a row that did not."""
+    """Number of consecutive searches without a detection of the person, up to the last one."""
     is_confirmed: bool
-    """Whether several cameras agreed on the person, or one camera detected the person
+    """Whether several cameras have agreed on the person, or one camera has detected the person
     repeatedly."""
 
 
 class Bystanders(Stateful):
-    """The people beyond the slots of W workers, for a batch of environments.
+    """The people without one of the W slots, for a batch of environments.
 
     Args:
         batch: number B of environments.
@@ -89,14 +90,14 @@ class Bystanders(Stateful):
         self.since = np.zeros(batch, int)
         """(B,) number of steps since the last search."""
         self.given_up = np.zeros((batch, n_workers), int)
-        """(B, W) number of steps for which a slot is given up to a person nearer to the robot."""
+        """(B, W) remaining steps for which a slot is given up to a person nearer to the robot."""
 
     def forget(self, b: int) -> None:
-        """Begin environment b anew."""
+        """Reset environment b."""
         self.people[b], self.since[b], self.given_up[b] = [], 0, 0
 
     def others(self, ids: Ints, dt_s: float) -> Others:
-        """Return the confirmed people of environments `ids`, with steps of `dt_s` [s]."""
+        """Return the confirmed bystanders of environments `ids`; a step lasts `dt_s` [s]."""
         others = no_others(len(ids))
         for row, b in enumerate(ids.tolist()):
             confirmed = [person for person in self.people[b] if person.is_confirmed]
@@ -106,7 +107,7 @@ class Bystanders(Stateful):
         return others
 
     def tick(self, b: int) -> None:
-        """Count a step of environment b."""
+        """Advance the counters of environment b by a step."""
         self.people[b] = [replace(person, age=person.age + 1) for person in self.people[b]]
         self.since[b] += 1
         self.given_up[b] = np.maximum(self.given_up[b] - 1, 0)
@@ -114,19 +115,19 @@ class Bystanders(Stateful):
     def is_search_due(self, b: int, often: int) -> bool:
         """Return whether a search of environment b is due while all workers are tracked.
 
-        It is every `EVERY` steps, and every `often` steps while there may be other people.
+        A search is due every `EVERY` steps, or every `often` steps while there may be bystanders.
         """
         return bool(self.since[b] >= (often if self.people[b] else EVERY))
 
     def select_nearest(
         self, found: Candidates, slots: int, robot_world: Capsules | None
     ) -> Candidates:
-        """Return the people nearest to the robot, as many as there are free slots.
+        """Select the people nearest to the robot, at most as many as there are free slots.
 
         Args:
             found: (C,) people in each camera.
             slots: number of free slots.
-            robot_world: (K, 2, 3) the robot's capsules [m]; None: all people are returned.
+            robot_world: (K, 2, 3) the robot's capsules [m]; if None, all people are returned.
         """
         least = min(2, len(self.cameras))
         several = [one for one in sightings(found, self.cameras) if one.n_cameras >= least]
@@ -144,14 +145,16 @@ class Bystanders(Stateful):
         hips_world: Points3,
         robot_world: Capsules | None,
     ) -> list[Sighting]:
-        """Take in a search, and return the people besides the workers.
+        """Update the bystanders with the result of a search, and return the people found.
+
+        The returned sightings exclude the workers.
 
         Args:
-            b: the environment.
+            b: index of the environment.
             found: (C,) people in each camera.
             taken: windows (C,) in which workers were detected.
-            hips_world: (W, 3) hips of the workers [m]; NaN without a track.
-            robot_world: (K, 2, 3) the robot's capsules [m]; None: unknown.
+            hips_world: (W, 3) hips of the workers [m]; NaN for workers without a track.
+            robot_world: (K, 2, 3) the robot's capsules [m]; None if they are unknown.
         """
         beside = [
             one
@@ -176,10 +179,10 @@ class Bystanders(Stateful):
         hips_world: Points3,
         robot_world: Capsules | None,
     ) -> bool:
-        """Return whether a sighting is of a worker, of the robot, or of no person.
+        """Return whether a sighting shows a worker, the robot, or no person.
 
-        Of a camera alone that detects the worker as well, in another window, it is another person;
-        see `update` for the arguments.
+        A sighting by only one camera shows another person if that camera also detects the worker
+        in a different window. For the arguments see `update`.
         """
         away_m = np.linalg.norm((hips_world - one.hips_world)[:, :2], axis=-1)
         if (away_m < APART_M).any():
@@ -191,12 +194,12 @@ class Bystanders(Stateful):
             windows = [each[c] for each in taken]
             if any(is_same_person(other, window) for other in found[c] for window in windows):
                 return False
-            mine = needed(one.windows[c], "A window")
+            mine = require(one.windows[c], "A window")
             return any(is_same_person(mine, window, BESIDE) for window in windows)
         return robot_world is not None and _away_m(one.hips_world, robot_world) < ROBOT_M
 
     def _hand_over(self, b: int, hips_world: Points3, robot_world: Capsules) -> None:
-        """Give up the worker farthest from the robot if another person is nearer."""
+        """Give up the slot of the worker farthest from the robot if a bystander is nearer."""
         near = [
             _away_m(person.hips_world, robot_world)
             for person in self.people[b]
@@ -208,7 +211,7 @@ class Bystanders(Stateful):
 
 
 def _exclude_workers(found: Candidates, taken: Windows) -> Candidates:
-    """Return the people (C,) without the workers, with one detection in a camera each."""
+    """Return the people (C,) that are not workers, with one detection per person and camera."""
     beside = [list(windows) for windows in found]
     for c, windows in enumerate(beside):
         for mine in (each[c] for each in taken):
@@ -222,12 +225,12 @@ def _exclude_workers(found: Candidates, taken: Windows) -> Candidates:
 def _update_person(
     person: Bystander, left: list[Sighting], hips_world: Points3
 ) -> Bystander | None:
-    """Return a remembered person after a search; None if the person is forgotten or tracked.
+    """Return a bystander after a search, or None if the person is forgotten or now tracked.
 
     Args:
-        person: the person.
-        left: sightings without a person yet; the person's sighting is removed.
-        hips_world: (W, 3) hips of the workers [m]; NaN without a track.
+        person: the bystander before the search.
+        left: sightings that are not assigned to a person yet; the person's sighting is removed.
+        hips_world: (W, 3) hips of the workers [m]; NaN for workers without a track.
     """
     off_m = [math.dist(person.hips_world[:2], one.hips_world[:2]) for one in left]
     if min(off_m, default=math.inf) < SAME_M + WALKED_M * person.age:
@@ -242,7 +245,7 @@ def _update_person(
 
 
 def _away_m(hips_world: Points3, robot_world: Capsules) -> float:
-    """Return the distance of hips (3,) from the axes of capsules (K, 2, 3) [m]."""
+    """Return the distance of hips (3,) from the nearest of the axes of capsules (K, 2, 3) [m]."""
     point = np.broadcast_to(hips_world, (1, 1, 1, 2, 3))
     capsules, radius = robot_world[None], np.zeros(len(robot_world))
     return float(least_separation(capsules, radius, point, np.zeros(1)).distance_m[0, 0])

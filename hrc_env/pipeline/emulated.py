@@ -1,4 +1,4 @@
-"""Level `keypoints`: the detector's errors on the projected truth."""
+"""Level `keypoints`: the true joints, projected into the images, with the detector's errors."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -26,21 +26,21 @@ class _Exposure(NamedTuple):
     """The scene of a step, and the conditions under which the detector works."""
 
     now: TrueSensorInput
-    """The scene."""
+    """The scene with the true states of the workers."""
     expected: PoseEstimate
-    """The tracker's prediction."""
+    """Prediction of the tracker for this step."""
     dim: Quality | None
-    """(B, C) quality of the pictures; None: usual light."""
+    """(B, C) quality of the images; None in usual light."""
 
 
 class EmulatedCameras(TrueState):
-    """Cameras and detector in one: they turn the truth into keypoints.
+    """An emulator of cameras and detector, which computes keypoints from the true poses.
 
     Args:
-        scene: with the rig's cameras.
+        scene: the scene with the rig's cameras.
         batch: number B of environments.
         config: settings of the environment.
-        schedule: behaviour of the cameras.
+        schedule: schedule of the cameras' images and faults.
     """
 
     CHANGES = ("history", "emulator", "light", "blank")
@@ -50,15 +50,15 @@ class EmulatedCameras(TrueState):
         self.history = None if schedule.is_plain else History(batch, schedule)
         self.appearance, self.schedule = config.appearance, schedule
         self.light = np.ones(batch)
-        """(B,) strength of the light in each environment's episode; 1 is as the scene was built."""
+        """(B,) strength of the light in each environment's episode, relative to the default."""
         self.blank = np.zeros((batch, len(scene.cameras)), np.bool_)
-        """(B, C) whether a camera's present picture is blank."""
+        """(B, C) whether a camera's present image is blank."""
         self.emulator = emulator.make_state(
             batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Forget the images of environments `ids`; draw faults, light and lasting errors."""
+        """Delete the images of environments `ids` and draw new faults, light and lasting errors."""
         if self.history is not None:
             self.history.reset(ids, rngs)
         if self.appearance != AS_BUILT:
@@ -70,7 +70,7 @@ class EmulatedCameras(TrueState):
         """Return the keypoints of the present scene; see `emulator.emulate`.
 
         Args:
-            expected: (B, W, ...) the tracker's prediction.
+            expected: (B, W, ...) prediction of the tracker.
             rngs: one generator for each environment.
         """
         ids = self.now.ids
@@ -92,7 +92,7 @@ class EmulatedCameras(TrueState):
         rngs: Generators,
         cameras: tuple[PinholeCamera, ...],
     ) -> Keypoints:
-        """Return the keypoints of a scene in some cameras, and advance the state of the errors."""
+        """Return the keypoints of a scene in these cameras, and advance the state of the errors."""
         now = exposure.now
         keypoints = emulator.emulate(
             state,
@@ -109,7 +109,7 @@ class EmulatedCameras(TrueState):
         return emulator.shuffle_workers(keypoints, rngs)
 
     def _picture_quality(self, ids: Ints) -> Quality | None:
-        """Return the quality (B, C) of the pictures that are taken now; None: usual light."""
+        """Return the quality (B, C) of the images taken now, or None in usual light."""
         if self.appearance == AS_BUILT and not any(f.group == IMAGE for f in self.schedule.faults):
             return None
         steps = np.zeros(len(ids), int) if self.history is None else self.history.steps[ids] + 1
@@ -129,9 +129,9 @@ class EmulatedCameras(TrueState):
     def _emulate_frames(
         self, exposure: _Exposure, state: EmulatorState, rngs: Generators, history: History
     ) -> Keypoints:
-        """Return the keypoints of the images that have arrived.
+        """Return the keypoints of the images that have arrived by now.
 
-        They may be present, older, or none.
+        A camera may have delivered the present image, an older one, or none.
         """
         rig, ids = self.scene.cameras, exposure.now.ids.tolist()
         actual = [
@@ -159,7 +159,7 @@ class EmulatedCameras(TrueState):
 
 
 class EmulatorPipeline(PoseTracking):
-    """Level `keypoints`: the detector's errors on the projected truth."""
+    """The pipeline of level `keypoints`, which gets keypoints from an emulator of the detector."""
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -168,7 +168,7 @@ class EmulatorPipeline(PoseTracking):
         super().__init__(batch, make_setup(scene, config), tracker, self.cameras)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) with images that have arrived and are not blank."""
+        """Return a mask (B, C) of the cameras with an image that has arrived and is not blank."""
         return super().searched_cameras(ids, age_s) & ~self.cameras.blank[ids]
 
     def schedule_of(self, b: int) -> Schedule:

@@ -1,8 +1,8 @@
-"""Cameras that differ from episode to episode, by pipelines for single environments.
+"""Pipelines for single environments with cameras that differ from episode to episode.
 
-A pipeline has one rig, one list of faults and one appearance. An environment with others in its
-episode gets a pipeline of its own. As no result depends on the size of a batch, its results are
-those of a single environment with that rig, bit for bit.
+A pipeline has one rig, one list of faults and one appearance. An environment gets a separate
+pipeline if its episode has others. Because no result depends on the batch size, that pipeline gives
+exactly the results of a single environment with the same rig, bit for bit.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, one, rows, write_rows
-from hrc_env.core.errors import needed
+from hrc_env.core.batching import map_arrays, one, rows, write_rows
+from hrc_env.core.errors import require
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.core.vacancy import Coverage, Vacancy
@@ -31,9 +31,9 @@ class CameraSetup:
     """The cameras of one episode."""
 
     rig: tuple[CameraConfig, ...]
-    """The cameras, which the estimator knows."""
+    """Configurations of the cameras, which the estimator knows."""
     faults: tuple[FaultConfig, ...]
-    """Their faults."""
+    """Faults of the cameras."""
     appearance: AppearanceConfig
     """Appearance of the scene."""
 
@@ -42,17 +42,17 @@ class MakePipeline(Protocol):
     """A factory of pipelines for single environments with other cameras."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
-        """Return a pipeline with these cameras, which borrows renderer and networks of `like`."""
+        """Return a pipeline with these cameras that borrows the renderer and networks of `like`."""
         ...
 
 
 class OwnState(NamedTuple):
-    """The state of an environment with cameras of its own."""
+    """The state of an environment with a separate pipeline."""
 
     setup: CameraSetup
-    """Its cameras."""
+    """Cameras of the environment's episode."""
     state: Any
-    """State of its pipeline."""
+    """State of the environment's pipeline."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,17 +62,17 @@ class EpisodicState:
     shared: Any
     """State of the pipeline that most environments share."""
     own: dict[int, OwnState]
-    """States of environments with cameras of their own."""
+    """States of the environments with a separate pipeline, by the environment's index."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Own:
-    """The pipeline of an environment with cameras of its own."""
+    """The separate pipeline of an environment."""
 
     setup: CameraSetup
-    """Its cameras."""
+    """Cameras of the environment's episode."""
     pipeline: PerceptionPipeline
-    """Its pipeline, with a batch of one."""
+    """The environment's pipeline, with a batch of one."""
 
     def get_state(self) -> OwnState:
         """Return the cameras and a copy of the pipeline's state."""
@@ -81,43 +81,43 @@ class _Own:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """The environments of a call that belong to one pipeline."""
+    """Those of the requested environments that share a pipeline."""
 
     pipeline: PerceptionPipeline
-    """The pipeline."""
+    """The pipeline of these environments."""
     rows: Ints
-    """(n,) their rows in the call."""
+    """(n,) rows of these environments in the requested batch."""
     ids: Ints
-    """(n,) their indices in the pipeline."""
+    """(n,) indices of these environments in the pipeline."""
     columns: Ints
-    """(C,) indices of the pipeline's cameras in the names of the environment."""
+    """(C,) indices of the pipeline's cameras in `EpisodicPipeline.names`."""
 
 
 class _PartRecord(NamedTuple, Generic[RecordT]):
-    """The record of a part of the environments."""
+    """A record of the environments that share a pipeline."""
 
     part: _Part
-    """The environments."""
+    """The environments and their pipeline."""
     record: RecordT
-    """(n, ...) their record."""
+    """(n, ...) record of these environments."""
 
 
 class _Place(NamedTuple):
-    """The place of an environment."""
+    """The pipeline of an environment and its index there."""
 
     pipeline: PerceptionPipeline
-    """Its pipeline."""
+    """Pipeline of the environment."""
     row: int
-    """Its index in the pipeline."""
+    """Index of the environment in the pipeline."""
 
 
 class EpisodicPipeline(PerceptionPipeline):
-    """A pipeline that most environments share, and one for each environment with other cameras.
+    """A shared pipeline for most environments and a separate one for each with other cameras.
 
     Args:
-        shared: the pipeline of most environments.
-        names: names of all cameras; every rig has some of them.
-        make: factory of the other pipelines.
+        shared: the pipeline that most environments share.
+        names: names of all cameras; every rig has a subset of them.
+        make: factory of the separate pipelines.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class EpisodicPipeline(PerceptionPipeline):
         self._own: dict[int, _Own] = {}
 
     def assign(self, b: int, setup: CameraSetup | None) -> None:
-        """Give the next episode of environment `b` these cameras; None: the shared ones."""
+        """Set the cameras of environment `b` for its next episode; None means the shared ones."""
         had = self._own.get(b)
         if had is not None and had.setup == setup:
             return
@@ -139,11 +139,11 @@ class EpisodicPipeline(PerceptionPipeline):
             self._own[b] = _Own(setup, self._make(setup, self.shared))
 
     def setup_of(self, b: int) -> CameraSetup | None:
-        """Return the cameras of environment `b`; None: the shared ones."""
+        """Return the cameras of environment `b`, or None if it has the shared ones."""
         return self._own[b].setup if b in self._own else None
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget environments `ids`."""
+        """Reset environments `ids`, for new episodes."""
         shared = [b for b in ids.tolist() if b not in self._own]
         if shared:
             self.shared.reset(np.array(shared), sensor_rngs, tracker_rngs)
@@ -164,30 +164,31 @@ class EpisodicPipeline(PerceptionPipeline):
         return self._gather(ids, perceive)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return the belief about a time ahead; see `PerceptionPipeline.forecast`."""
+        """Forecast the belief for a future time; see `PerceptionPipeline.forecast`."""
         return self._gather(
             ids,
             lambda part: part.pipeline.forecast(rows(now, part.rows), part.ids, horizon_s),
         )
 
     def last_detections(self, b: int) -> Detections:
-        """Return the last keypoints of environment `b`, and their windows."""
+        """Return the last keypoints of environment `b` and their windows."""
         pipeline, b = self._place(b)
         return pipeline.last_detections(b)
 
     @property
     def measurements(self) -> Keypoints:
-        """Last keypoints (B, C, W, J) that estimators got, with cameras by `names`.
+        """Last keypoints (B, C, W, J) that the estimators received.
 
-        A camera that is not in an episode's rig has neither keypoints nor a time.
+        The cameras are in the order of `names`. A camera that is not in an episode's rig has no
+        keypoints and no time.
         """
         shared = self.shared.measurements
-        whole = replace(mapped(shared, np.copy), time_s=self._times_s(self.shared, shared))
+        whole = replace(map_arrays(shared, np.copy), time_s=self._times_s(self.shared, shared))
         for b, own in self._own.items():
             seen, columns = own.pipeline.measurements, self._columns(own)
             seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
             whole.px[b], whole.confidence[b], whole.sigma_px[b] = np.nan, 0.0, np.inf
-            needed(whole.time_s, "Times of frames")[b] = np.nan
+            require(whole.time_s, "Times of frames")[b] = np.nan
             write_rows(one(whole, b), columns, one(seen, 0))
         return whole
 
@@ -197,7 +198,7 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.crops(b)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b` in its episode; None: as it was built."""
+        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
         pipeline, b = self._place(b)
         return pipeline.look_of(b)
 
@@ -212,9 +213,9 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.light_of(b)
 
     def suspected_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C), by `names`, that may be miscalibrated.
+        """Return a mask (B, C) of possibly miscalibrated cameras, in the order of `names`.
 
-        Cameras that are not in an episode's rig are not.
+        It is False for cameras that are not in an episode's rig.
         """
         found = np.zeros((len(ids), len(self.names)), np.bool_)
         for part in self._parts(ids):
@@ -222,9 +223,9 @@ class EpisodicPipeline(PerceptionPipeline):
         return found
 
     def vacancy(self, ids: Ints) -> Vacancy | None:
-        """Return the state of the floor of environments `ids`; None without cameras.
+        """Return the state of the floor of environments `ids`, or None if there are no cameras.
 
-        If they have several rigs, every piece of the floor is a group of its own.
+        If the environments have several rigs, every patch of floor forms a separate group.
         """
         parts = self._parts(ids)
         found = [_PartRecord(part, part.pipeline.vacancy(part.ids)) for part in parts]
@@ -253,12 +254,12 @@ class EpisodicPipeline(PerceptionPipeline):
         self.shared.close()
 
     def get_state(self) -> EpisodicState:
-        """Return a copy of everything that changes, including cameras of single environments."""
+        """Return a copy of the changing state, including the cameras of single environments."""
         own = {b: each.get_state() for b, each in self._own.items()}
         return EpisodicState(self.shared.get_state(), own)
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state, which may be of a pipeline that all environments shared."""
+        """Restore a state, which may be one of a pipeline that all environments shared."""
         if not isinstance(state, EpisodicState):
             state = EpisodicState(state, {})
         self.shared.set_state(state.shared)
@@ -279,11 +280,11 @@ class EpisodicPipeline(PerceptionPipeline):
             self._own[b].pipeline.set_state(state)
 
     def _place(self, b: int) -> _Place:
-        """Return the pipeline of environment `b`, and its index there."""
+        """Return the pipeline of environment `b` and its index there."""
         return _Place(self._own[b].pipeline, 0) if b in self._own else _Place(self.shared, b)
 
     def _parts(self, ids: Ints) -> list[_Part]:
-        """Return environments `ids` by pipeline, those of the shared one first."""
+        """Group environments `ids` by their pipeline, beginning with the shared one."""
         mine = np.array([b in self._own for b in ids.tolist()], bool)
         shared = np.flatnonzero(~mine)
         everything = np.arange(len(self.names))
@@ -299,21 +300,21 @@ class EpisodicPipeline(PerceptionPipeline):
 
     @staticmethod
     def _times_s(pipeline: PerceptionPipeline, seen: Keypoints) -> Floats:
-        """Return the times of frames (B, C), which are present in a pipeline without times [s]."""
+        """Return the times (B, C) of frames [s]; pipelines without times have current frames."""
         if seen.time_s is not None:
             return seen.time_s.copy()
         return np.repeat(pipeline.now_s[:, None], seen.px.shape[1], axis=1)
 
     def _gather(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
-        """Return the results of a function of each part as one estimate (B, W, ...)."""
+        """Apply a function to each part and join the results to one estimate (B, W, ...)."""
         return _join(len(ids), [_PartRecord(part, find(part)) for part in self._parts(ids)])
 
 
 class EpisodicSensor(Sensor):
-    """The sensors of an `EpisodicPipeline`, each of which gets its own environments.
+    """The sensors of an `EpisodicPipeline`; each receives the environments of its pipeline.
 
     Args:
-        needs_truth: whether they take a `TrueSensorInput`.
+        needs_truth: whether the sensors require a `TrueSensorInput`.
         parts: function that groups environments by pipeline.
     """
 
@@ -321,18 +322,18 @@ class EpisodicSensor(Sensor):
         self.NEEDS_TRUTH, self._parts = needs_truth, parts
 
     def expose(self, now: SensorInput) -> None:
-        """Take in the scene, which is kept until the next exposure."""
+        """Pass the present scene to the sensors, which keep it until the next exposure."""
         self.now = now
         for part in self._parts(now.ids):
             part.pipeline.sensor.expose(replace(rows(now, part.rows), ids=part.ids))
 
 
 def _join(n: int, parts: list[_PartRecord[RecordT]]) -> RecordT:
-    """Return the records of parts of n environments as one."""
+    """Join the records of the parts of n environments to one record."""
     first = parts[0].record
     if len(parts) == 1 and len(parts[0].part.rows) == n:
         return first
-    whole = mapped(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
+    whole = map_arrays(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
     for each in parts:
         write_rows(whole, each.part.rows, each.record)
     return whole

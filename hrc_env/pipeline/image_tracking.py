@@ -1,4 +1,4 @@
-"""Tracking of people in images: crops around them go through the pose network."""
+"""Tracking of people in images, by the pose network on crops around them."""
 
 from dataclasses import replace
 
@@ -17,28 +17,31 @@ from hrc_env.tracking.presence import SEARCHES
 
 
 class ImageSensor(Sensor):
-    """Cameras that give images."""
+    """A sensor that consists of cameras with images."""
 
     images: ImageSource
-    """Present images of the environment of the last call of `show`."""
+    """Present images of the environment for which `show` was called last."""
     has_times = True
-    """Whether images may be old, and have the times at which they were taken."""
+    """Whether images may be delayed and carry the times at which they were taken."""
 
     def show(self, b: int) -> Floats:
-        """Make the images of environment b present.
+        """Set `images` to the present images of environment b.
 
         Returns:
             (C,) time at which each camera's image was taken, by the clock of `Keypoints.time_s`
-            [s]; NaN: there is none.
+            [s]; NaN for cameras without an image.
         """
         raise NotImplementedError
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) with images that repeat, and prove no absence; (B, 1): none."""
+        """Return a mask (B, C) of cameras with repeating images, which do not prove absence.
+
+        The base class returns False, (B, 1).
+        """
         return np.zeros((len(ids), 1), np.bool_)
 
     def robots_world(self) -> Capsules | None:
-        """Return the robots' capsules (B, K, 2, 3) [m]; None: unknown."""
+        """Return the robots' capsules (B, K, 2, 3) [m], or None if they are unknown."""
         return None
 
 
@@ -68,7 +71,7 @@ class ImageTracking(PoseTracking):
         self.image_sensor, self.worker_detector = sensor, detector
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Return the landmarks of crops around predicted workers, or in a search."""
+        """Return keypoints from crops around the predicted workers, or from a search."""
         sensor = self.image_sensor
         seen = no_keypoints(len(ids), len(self.setup.cameras), self.setup.n_workers)
         time_s, robots_world = np.zeros(seen.px.shape[:2]), sensor.robots_world()
@@ -82,29 +85,29 @@ class ImageTracking(PoseTracking):
         return replace(seen, time_s=time_s if sensor.has_times else None)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) with whole images that have been searched for people."""
+        """Return a mask (B, C) of the cameras that have searched a whole image for people."""
         return self.worker_detector.searched_cameras(ids) & ~self.image_sensor.stuck_cameras(ids)
 
     def cameras_with_others(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) with people besides the workers in their last search."""
+        """Return a mask (B, C) of cameras that found people besides workers in the last search."""
         return self.worker_detector.unexplained[ids]
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction without the tracks that are given up to people near the robot."""
+        """Return a prediction without the tracks that lose their slots to nearer people."""
         return self.worker_detector.drop_given_up(ids, expected)
 
     def others(self, ids: Ints) -> Others:
-        """Return the people beyond the slots."""
+        """Return the people without a slot."""
         return self.worker_detector.bystanders.others(ids, self.setup.dt_s)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget the tracks and the images of environments `ids`."""
+        """Delete the tracks and the images of environments `ids`."""
         super().reset(ids, sensor_rngs, tracker_rngs)
         for b in ids:
             self.worker_detector.forget(int(b))
 
     def last_detections(self, b: int) -> Detections:
-        """Return the last keypoints of environment `b`, and their windows."""
+        """Return the last keypoints of environment `b` and their windows."""
         return Detections(super().last_detections(b).keypoints, self.worker_detector.windows[b])
 
     def crops(self, b: int) -> list[Image | None]:

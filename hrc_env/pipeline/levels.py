@@ -1,9 +1,9 @@
-"""Perception levels: pipelines from sensors to a belief about the workers, with one interface.
+"""Perception levels: pipelines with one interface, from sensors to a belief about the workers.
 
 | level | input of the estimator |
 |---|---|
-| `pixels` | MediaPipe Pose on crops rendered around the workers that it predicts |
-| `keypoints` | an emulator of that: the projected truth with the detector's errors |
+| `pixels` | keypoints of MediaPipe Pose in crops that are rendered around the predicted workers |
+| `keypoints` | keypoints of an emulator: the projected true joints with the detector's errors |
 | `truth` | none: the estimate is the truth |
 | `none` | none: the estimate is the prior |
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows, write_rows
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Ints
@@ -39,7 +39,7 @@ LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
 """Levels that have cameras."""
 EMULATED = ("darkness",)
-"""Kinds of faults of images that level `keypoints` emulates."""
+"""Kinds of image faults that level `keypoints` emulates."""
 
 
 def prepare(level: str, detector: DetectorConfig) -> None:
@@ -67,20 +67,20 @@ def make_pipeline(
     Args:
         level: one of `LEVELS`.
         estimator: the estimator, as in `EnvConfig`.
-        scene: with the rig's cameras.
+        scene: the scene with the rig's cameras.
         batch: number of environments.
         config: settings of the environment.
         shows_images: whether observations contain images.
-        like: a pipeline of the same level and scene with other cameras, which lends its renderer
-            and networks; None: there is none.
+        like: a pipeline of the same level and scene with other cameras that lends its renderer
+            and networks, or None.
 
     Raises:
-        ConfigError: an unknown level, or one that does not support the settings.
+        ConfigError: the level is unknown or does not support the settings.
         WeightsError: the weights of level "pixels" are missing.
-        RenderingError: there is no OpenGL for level "pixels".
+        RenderingError: OpenGL, which level "pixels" needs, is not available.
     """
     if level not in LEVELS:
-        raise unknown("perception", level, LEVELS)
+        raise make_unknown_name_error("perception", level, LEVELS)
     check_supported(level, config.appearance, config.faults, shows_images)
     schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
     memory_s = max(config.tracker.max_delay_s, min(schedule.max_delay_s, 1.0))
@@ -114,7 +114,7 @@ class PipelineOfEpisode:
     """Whether observations contain images."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
-        """Return the pipeline of an episode's cameras, which borrows from `like`."""
+        """Return a pipeline with these cameras that borrows the renderer and networks of `like`."""
         scene = with_rig(self.scene, setup.rig)
         config = replace(self.config, faults=setup.faults, appearance=setup.appearance)
         return make_pipeline(self.level, self.estimator, scene, 1, config, self.shows_images, like)
@@ -137,9 +137,9 @@ def check_supported(
 
     Args:
         level: the perception level.
-        appearance: the appearance of scenes.
-        faults: the faults of cameras.
-        shows_images: whether observations contain images, which show every appearance.
+        appearance: the appearance of the scene.
+        faults: the faults of the cameras.
+        shows_images: whether observations contain images; these support every appearance.
 
     Raises:
         ConfigError: the level does not support one of them.
@@ -170,7 +170,7 @@ class Oracle(PerceptionPipeline):
 
     Args:
         config: settings of the tracker.
-        nobody: (B, W, ...) estimate of slots without a worker.
+        nobody: (B, W, ...) estimate for slots without a worker.
     """
 
     def __init__(self, config: TrackerConfig, nobody: PoseEstimate) -> None:
@@ -180,7 +180,7 @@ class Oracle(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the truth as an estimate; absent workers have the prior, and none is unknown."""
+        """Return the truth as an estimate: absent workers get the prior, and no slot is unknown."""
         known = require_truth(self.sensor.now)
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
@@ -190,15 +190,15 @@ class Oracle(PerceptionPipeline):
         return believed
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return a forecast of the motion, as the future is not part of the truth."""
+        """Return a forecast by the tracker's motion model, as true future poses are unknown."""
         return forecast(now, horizon_s, self.config)
 
 
 class NoPerception(PerceptionPipeline):
-    """Level `none`: the estimate is the prior, and every worker is unknown.
+    """Level `none`: the estimate is the prior, and every slot is unknown.
 
     Args:
-        prior: (B, W, ...) the prior.
+        prior: (B, W, ...) prior of the workers.
         dt_s: time between steps [s].
     """
 
@@ -208,13 +208,13 @@ class NoPerception(PerceptionPipeline):
         self.sensor, self.prior, self.dt_s = Sensor(), prior, dt_s
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Begin environments `ids` anew, with a prior of age zero."""
+        """Reset environments `ids`, and set the age of their prior to zero."""
         self.prior.unobserved_s[ids] = 0.0
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the prior of environments `ids`, older by a step."""
+        """Return the prior of environments `ids`, with its age increased by one step."""
         self.prior.unobserved_s[ids] += self.dt_s
         return rows(self.prior, ids)
 

@@ -1,4 +1,4 @@
-"""Images in observations: those of the rig's cameras, drawn for the policy."""
+"""Images of the rig's cameras, rendered for the observations of policies."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
 from hrc_env.geometry.camera_config import CameraConfig
@@ -24,16 +24,16 @@ Images = dict[str, NDArray[np.uint8]]
 
 
 class ObservedImages:
-    """A renderer of images for observations, which follow from scene and appearance alone.
+    """A renderer of images for observations, which depend only on the scene and its appearance.
 
     Args:
-        scene: with the rig's cameras.
+        scene: the scene with the rig's cameras.
         config: settings of the images.
-        bends: whether cameras of an episode may have lenses if those of the scene have none.
+        bends: whether cameras of an episode may have lenses although those of the scene have none.
 
     Raises:
-        ConfigError: a camera that is not in the rig, or twice.
-        RenderingError: there is no OpenGL.
+        ConfigError: a chosen camera is not in the rig or is chosen twice.
+        RenderingError: OpenGL is not available.
     """
 
     def __init__(self, scene: Scene, config: ImageConfig, bends: bool = False) -> None:
@@ -43,7 +43,7 @@ class ObservedImages:
         squares = [_square_px(each, config) for each in self.cameras] if self._bends else []
         self._renderer = CameraImages(scene, config.height, config.width, max(squares, default=1))
         self._viewer = LensRenderer(self._renderer, self.cameras)
-        self._renderer.show()  # without OpenGL it says so here, not in an episode
+        self._renderer.show()  # a missing OpenGL raises its error here, not in an episode
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -59,9 +59,9 @@ class ObservedImages:
         """Return the images (B, H, W, 3) of environments by name.
 
         Args:
-            now: the scene; rows are environments.
-            looks: (B,) appearance of each environment; None: as it was built.
-            rigs: (B,) cameras of each episode; images of other cameras are black.
+            now: the scene of each environment, row by row.
+            looks: (B,) appearance of each environment; None for the scene as built.
+            rigs: (B,) cameras of each episode; images of all other cameras are black.
         """
         images = {name: np.zeros((len(now.ids), *self.shape), np.uint8) for name in self.names}
         for row, (b, look) in enumerate(zip(now.ids.tolist(), looks, strict=True)):
@@ -73,7 +73,7 @@ class ObservedImages:
         return images
 
     def check(self, rig: Sequence[CameraConfig]) -> None:
-        """Raise `ConfigError` for a rig with images that cannot be drawn."""
+        """Raise `ConfigError` if the images of a rig cannot be rendered."""
         for camera in rig:
             bent = camera.lens.model != "none" and f"{IMAGE}{camera.name}" in self.names
             if bent and not self._bends:
@@ -88,7 +88,7 @@ class ObservedImages:
         self._renderer.close()
 
     def _image(self, camera: PinholeCamera) -> Image:
-        """Return the image (H, W, 3) of a camera of the present scene."""
+        """Render the image (H, W, 3) of a camera in the present scene."""
         if camera.lens is None:
             return self._renderer.image(camera)
         side_px = max(camera.width_px, camera.height_px)
@@ -99,17 +99,17 @@ class ObservedImages:
 def _select_cameras(
     rig: tuple[PinholeCamera, ...], choices: Sequence[int | str] | None
 ) -> tuple[PinholeCamera, ...]:
-    """Return the cameras of a rig with these names or indices; None: all of them."""
+    """Return the cameras of a rig with these names or indices, or all if `choices` is None."""
     names = [camera.name for camera in rig]
     chosen: list[int] = []
     for choice in range(len(rig)) if choices is None else choices:
         if isinstance(choice, str):
             if choice not in names:
-                raise unknown("camera of observe_images", choice, names)
+                raise make_unknown_name_error("camera of observe_images", choice, names)
             chosen.append(names.index(choice))
         else:
             label = f"Camera of observe_images (of {', '.join(names)})"
-            chosen.append(whole(label, choice, 0, len(rig) - 1))
+            chosen.append(check_integer(label, choice, 0, len(rig) - 1))
     for index in chosen:
         if chosen.count(index) > 1:
             raise ConfigError(
@@ -119,14 +119,14 @@ def _select_cameras(
 
 
 def _square_px(camera: PinholeCamera, config: ImageConfig) -> int:
-    """Return the side of the square from which a lens's image is cut at full resolution [px]."""
+    """Return the side of the full-resolution square from which a lens's image is cropped [px]."""
     side_px = max(camera.width_px, camera.height_px)
     shares = config.width / camera.width_px, config.height / camera.height_px
     return int(np.ceil(SMOOTHING * side_px * max(shares)))
 
 
 def _shrink(square: Image, camera: PinholeCamera, shape: tuple[int, int, int]) -> Image:
-    """Return the part of a square that a camera's image covers, reduced to (H, W, 3)."""
+    """Crop a square to the part that a camera's image covers, and shrink it to (H, W, 3)."""
     scale = len(square) / max(camera.width_px, camera.height_px)
     high, wide = round(scale * camera.height_px), round(scale * camera.width_px)
     top, left = (len(square) - high) // 2, (len(square) - wide) // 2

@@ -1,7 +1,7 @@
-"""Images to poses without a simulator: recorded films, live cameras, other renderers.
+"""Pose tracking in images from any source: recorded videos, live cameras or other renderers.
 
 tracker = PoseTracker(cameras)
-for images in films:
+for images in videos:
     estimate = tracker.update(images)
 """
 
@@ -19,7 +19,7 @@ from hrc_env.core.brought import (
     points_of,
     positive,
 )
-from hrc_env.core.errors import needed, whole
+from hrc_env.core.errors import check_integer, require
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.camera_config import CameraConfig
@@ -37,15 +37,16 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 
 MOST_WORKERS = 16
-"""Greatest number of people that one tracker follows."""
+"""Greatest number of people that one tracker can track."""
 MOST_SUMS = 1000
-"""Number of checksums that are kept, as windows move with people."""
+"""Number of stored checksums of crops above which all are deleted, because windows move with
+people."""
 _ALONE = np.arange(1)
 """Indices of a batch of one environment."""
 
 
 class _Films(ImageSensor):
-    """The images of a caller; a camera with images that repeat bit for bit is stuck.
+    """The images that a caller passes; a camera is stuck if its images repeat bit for bit.
 
     Args:
         n_cameras: number C of cameras.
@@ -59,25 +60,25 @@ class _Films(ImageSensor):
         self.images = self
         self.source: ImageSource | None = None
         self.robot_world: Capsules | None = None
-        """(K, 2, 3) the robot's capsules [m]; None: unknown."""
+        """(K, 2, 3) the robot's capsules [m]; None if they are unknown."""
         self.sums: dict[tuple[int, Roi], int] = {}
         """Checksum of the last crop of each camera and window."""
         self.repeats: dict[int, bool] = {}
-        """Whether all crops in windows that were used before are the same, by camera."""
+        """Whether all crops from windows that were used before are unchanged, by camera."""
 
     def take(self, source: ImageSource, robot_world: Capsules | None) -> None:
-        """Take the next images in."""
+        """Set the present images and the robot's capsules."""
         self.source, self.robot_world, self.repeats = source, robot_world, {}
         if len(self.sums) > MOST_SUMS:
             self.sums.clear()
 
     def show(self, b: int) -> Floats:
-        """Return the times of the images (C,): all are present [s]."""
+        """Return the times (C,) of the images [s], which are zero, because all are current."""
         return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of the source's image, (256, 256, 3)."""
-        crop = crop_image(needed(self.source, "The image source"), camera_index, window)
+        """Return a window (256, 256, 3) of a camera's image, and check if the crop has changed."""
+        crop = crop_image(require(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
             same = self.sums[key] == new
@@ -86,30 +87,33 @@ class _Films(ImageSensor):
         return crop
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (1, C) of which all crops are the same as before."""
+        """Return a mask (1, C) of the cameras with only unchanged crops."""
         return np.array([[self.repeats.get(c, False) for c in range(self.n_cameras)]])
 
     def robots_world(self) -> Capsules | None:
-        """Return the robot's capsules (1, K, 2, 3) [m]; None: unknown."""
+        """Return the robot's capsules (1, K, 2, 3) [m], or None if they are unknown."""
         return None if self.robot_world is None else self.robot_world[None]
 
 
 class PoseTracker:
-    """A tracker of people in the images of a rig, without a simulator, as at level `pixels`.
+    """A tracker of people in the images of a rig, which works like level `pixels` of environments.
+
+    It needs no simulator.
 
     Args:
-        cameras: the rig: `CameraConfig`s, as `read_rig` returns them, of which the pose, the image
-            and the lens count; or cameras as of `make_cameras`.
+        cameras: the rig: either `CameraConfig`s, as `read_rig` returns them, of which only the
+            pose, the image and the lens are used; or the result of `make_cameras`.
         n_workers: greatest number of tracked people.
         dt_s: usual time between two sets of frames [s].
-        estimator: the estimator, as of an environment.
-        tracker: settings of the tracker; None: the defaults.
-        detector: settings of the detector; None: the defaults.
-        floor_world: (N, 3) points of the floor where people may be, some 0.25 m apart [m]; people
-            count as absent once cameras see all of it empty. None: the common views of cameras.
+        estimator: the estimator, as in `EnvConfig`.
+        tracker: settings of the tracker; None for the defaults.
+        detector: settings of the detector; None for the defaults.
+        floor_world: (N, 3) points of the floor where people may be, about 0.25 m apart [m]; people
+            are considered absent once the cameras have seen all of it empty. None for the floor
+            in the common view of the cameras.
 
     Raises:
-        ConfigError: an argument that cannot work.
+        ConfigError: an argument is invalid.
         WeightsError: the network's weights are missing.
     """
 
@@ -126,7 +130,7 @@ class PoseTracker:
         check_kinds("cameras", cameras, CameraConfig, PinholeCamera)
         check_kind("tracker", tracker, TrackerConfig, None)
         check_kind("detector", detector, DetectorConfig, None)
-        n_workers = whole("n_workers", n_workers, 1, MOST_WORKERS)
+        n_workers = check_integer("n_workers", n_workers, 1, MOST_WORKERS)
         dt_s = positive("dt_s", dt_s, "s")
         if floor_world is not None:
             floor_world = points_of("floor_world [m]", floor_world)
@@ -154,19 +158,20 @@ class PoseTracker:
         rngs: Sequence[np.random.Generator] = (),
         robot_world: Capsules | None = None,
     ) -> PoseEstimate:
-        """Take in the present images and return the belief about the people in them.
+        """Update the tracks with the present images, and return the belief about the people.
 
         Args:
-            source: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, or a source of windows
-                of them. Cameras with images that repeat bit for bit are stuck: they prove no
-                absence.
-            dt_s: time since the last frames [s]; None: the usual.
-            rngs: one generator, for estimators that draw; empty: one with seed 0.
-            robot_world: (K, 2, 3) the robot's capsules [m]; of more people than `n_workers` those
-                nearest to it are tracked. None: those that were tracked first.
+            source: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, or an `ImageSource`
+                that returns windows of them. A camera is considered stuck if its images repeat bit
+                for bit; it then does not prove that people are absent.
+            dt_s: time since the last frames [s]; None for the usual time.
+            rngs: one random generator, for stochastic estimators; if empty, one with seed 0.
+            robot_world: (K, 2, 3) the robot's capsules [m]. If there are more people than
+                `n_workers`, those nearest to the robot are tracked; if None, those that were
+                tracked first.
 
         Returns:
-            Workers (1, W, J, ...) in the frame of the cameras' poses.
+            Belief about the workers (1, W, J, ...), in the frame of the cameras' poses.
         """
         if isinstance(rngs, tuple | list) and not rngs:
             rngs = [np.random.default_rng(0)]
@@ -187,7 +192,7 @@ class PoseTracker:
         return bool(self._tracking.vacancy(_ALONE).others.any[0])
 
     def forget(self) -> None:
-        """Forget all people, as at the beginning."""
+        """Delete all tracks; the tracker is then in its initial state."""
         rngs = [np.random.default_rng(0)]
         self._tracking.reset(_ALONE, rngs, rngs)
 

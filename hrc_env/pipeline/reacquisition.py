@@ -1,8 +1,8 @@
 """Searches of whole images: their schedule, and searches for workers whose track is wrong.
 
-A camera rests for a while if no person was found in its image. If fewer than two cameras have shown
-a tracked worker for some steps, the images of the others are searched; if these agree on a person,
-they use windows there until the estimator follows.
+A camera without people in its image is not searched again for some steps. If fewer than two cameras
+have detected a tracked worker for some steps, the images of the others are searched; if these agree
+on a person, windows around that person are used until the estimator follows.
 """
 
 from collections.abc import Collection, Sequence
@@ -17,14 +17,15 @@ from hrc_env.perception.searching import Candidates, Views, agreed_windows, excl
 from hrc_env.pipeline.sensor_input import Windows
 
 REMEMBERED = 10
-"""Number of steps for which the result of a search counts for a camera that is not searched."""
+"""Number of steps for which the result of a camera's last search remains valid."""
 PATIENCE = 8
-"""Number of steps in a row without a worker after which a camera's whole image is searched."""
+"""Number of consecutive steps without a detection of a worker after which a camera's whole image
+is searched."""
 FOLLOWED = 5
-"""Number of steps for which a window from a search is used; estimators restart after
-three that contradict them."""
+"""Number of steps for which a window from a search is used; estimators restart after three
+contradicting steps."""
 ENOUGH = 2
-"""Number of cameras that must show a worker to hold the track."""
+"""Number of cameras that must detect a worker so that the track needs no search."""
 
 
 class SearchSchedule(Stateful):
@@ -33,7 +34,7 @@ class SearchSchedule(Stateful):
     Args:
         batch: number B of environments.
         n_cameras: number C of cameras.
-        every: number of steps after which a camera is searched again if it has shown no person.
+        every: number of steps after which a camera without people is searched again.
     """
 
     CHANGES = ("rests", "ages", "people", "blank")
@@ -41,41 +42,41 @@ class SearchSchedule(Stateful):
     def __init__(self, batch: int, n_cameras: int, every: int) -> None:
         self.every = every
         self.rests = np.zeros((batch, n_cameras), int)
-        """(B, C) number of steps for which a camera is not searched."""
+        """(B, C) number of further steps for which a camera is not searched."""
         self.ages = np.full((batch, n_cameras), REMEMBERED)
         """(B, C) number of steps since a camera was searched, up to `REMEMBERED`."""
         self.people: list[list[list[Roi]]] = [[[] for _ in range(n_cameras)] for _ in range(batch)]
-        """(B, C) the people that each camera found then."""
+        """(B, C) people that each camera's last search found."""
         self.blank = np.zeros((batch, n_cameras), np.bool_)
-        """(B, C) whether the image was blank then."""
+        """(B, C) whether the image of each camera's last search was blank."""
 
     def reset(self, b: int) -> None:
-        """Begin environment b anew."""
+        """Reset environment b."""
         self.rests[b], self.ages[b] = 0, REMEMBERED
         self.people[b] = [[] for _ in self.people[b]]
 
     def tick(self, b: int) -> None:
-        """Count a step of environment b."""
+        """Advance the counters of environment b by a step."""
         self.rests[b] = np.maximum(self.rests[b] - 1, 0)
         self.ages[b] = np.minimum(self.ages[b] + 1, REMEMBERED)
 
     def due_cameras(self, b: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the cameras with an image that is to be searched now."""
+        """Return the indices of the cameras with images that are to be searched now."""
         return np.flatnonzero(np.array(has_image) & (self.rests[b] == 0)).tolist()
 
     def remember(
         self, b: int, cameras: Sequence[int], found: Candidates, blank: Collection[int] = ()
     ) -> Candidates:
-        """Keep the result of a search.
+        """Store the result of a search.
 
         Args:
-            b: the environment.
+            b: index of the environment.
             cameras: indices of the cameras that were searched.
-            found: (C,) people that these cameras have found.
-            blank: indices of cameras with a blank image.
+            found: (C,) people that were found in the images of these cameras.
+            blank: indices of the cameras with a blank image.
 
         Returns:
-            (C,) people of all recent searches.
+            (C,) people found by all recent searches.
         """
         for c in cameras:
             self.people[b][c], self.ages[b, c] = list(found[c]), 0
@@ -84,12 +85,12 @@ class SearchSchedule(Stateful):
         return [people if recent[c] else [] for c, people in enumerate(self.people[b])]
 
     def rest(self, b: int) -> None:
-        """Let the cameras rest that have just been searched in vain."""
+        """Suspend searches of the cameras that have just been searched without finding a person."""
         self.rests[b, self.ages[b] == 0] = self.every
 
 
 class Reacquisition(Stateful):
-    """Searches for W tracked workers of B environments that most cameras do not show.
+    """Searches for those of W tracked workers of B environments that most cameras do not detect.
 
     Args:
         batch: number B of environments.
@@ -102,21 +103,21 @@ class Reacquisition(Stateful):
     def __init__(self, batch: int, n_workers: int, cameras: Sequence[PinholeCamera]) -> None:
         self.cameras = cameras
         self.unseen = np.zeros((batch, n_workers, len(cameras)), int)
-        """(B, W, C) number of steps in a row in which a camera has not shown the worker."""
+        """(B, W, C) number of consecutive steps in which a camera has not detected the worker."""
         self.elsewhere: list[Windows] = [
             [[None] * len(cameras) for _ in range(n_workers)] for _ in range(batch)
         ]
         """(B, W, C) windows in which a search has found the worker."""
         self.left = np.zeros((batch, n_workers), int)
-        """(B, W) number of steps for which these windows are still used."""
+        """(B, W) number of further steps for which the windows of `elsewhere` are used."""
 
     def reset(self, b: int, worker: int) -> None:
-        """Begin a worker of environment b anew."""
+        """Reset a worker of environment b."""
         self.unseen[b, worker], self.left[b, worker] = 0, 0
         self.elsewhere[b][worker] = [None] * self.unseen.shape[2]
 
     def blind_cameras(self, b: int, worker: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the cameras with images that are to be searched for a tracked worker."""
+        """Return the indices of the cameras that are to be searched for a tracked worker."""
         missing = self.unseen[b, worker] >= PATIENCE
         if self.left[b, worker] or np.sum(~missing) >= min(ENOUGH, len(missing)):
             return []
@@ -125,13 +126,13 @@ class Reacquisition(Stateful):
     def learn(
         self, b: int, worker: int, people: Candidates, windows: Views, others: Windows
     ) -> None:
-        """Take in a search of the blind cameras for a worker.
+        """Use the result of a search for a worker in the images of `blind_cameras`.
 
         Args:
-            b: the environment.
-            worker: the worker.
+            b: index of the environment.
+            worker: index of the worker.
             people: (C,) people that the search has found.
-            windows: (C,) windows by the track.
+            windows: (C,) windows predicted by the track.
             others: windows (C,) of other workers, which are excluded.
         """
         blind = self.unseen[b, worker] >= PATIENCE
@@ -145,7 +146,7 @@ class Reacquisition(Stateful):
             self.elsewhere[b][worker], self.left[b, worker] = agreed, FOLLOWED
 
     def choose_windows(self, b: int, worker: int, expected: Views) -> Views:
-        """Return the windows (C,) of a worker: of a recent search, else those by the track."""
+        """Return the windows (C,) of a worker from a recent search, or else from the track."""
         if not self.left[b, worker]:
             return expected
         self.left[b, worker] -= 1
@@ -153,5 +154,5 @@ class Reacquisition(Stateful):
         return [there if there is not None else here for there, here in pairs]
 
     def count(self, b: int, worker: int, shown: Bools) -> None:
-        """Count a step in which some cameras (C,) have shown a worker."""
+        """Update the counters of a worker, given a mask (C,) of the cameras that detected it."""
         self.unseen[b, worker] = np.where(shown, 0, self.unseen[b, worker] + 1)

@@ -1,6 +1,6 @@
-"""Preparation of a machine for a command: weights, OpenGL, kernels.
+"""Preparation of a machine for a command: network weights, OpenGL and compiled kernels.
 
-Imports are inside the functions, so that `--help` loads neither simulator nor compiler.
+Imports are inside the functions, so that `--help` loads neither the simulator nor the compiler.
 """
 
 import os
@@ -19,23 +19,23 @@ class OpenGL(NamedTuple):
     """The state of OpenGL on a machine."""
 
     is_ready: bool
-    """Whether a pixel can be drawn."""
+    """Whether pictures can be rendered."""
     message: str
     """A sentence that describes the state."""
 
 
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:
-    """Fetch and compile what a perception level needs and this machine lacks.
+    """Fetch the weights and compile the kernels that a perception level needs, if missing.
 
     Args:
         console: console for messages.
         level: perception level.
-        draws: whether pictures are drawn at every level.
+        draws: whether the command renders pictures at every level.
         installs: whether OpenGL may be installed (see `find_opengl`).
 
     Raises:
         WeightsError: weights are missing and cannot be fetched.
-        RenderingError: there is no OpenGL.
+        RenderingError: OpenGL is needed but not available.
     """
     if level == "pixels":
         fetch_networks(console, is_verbose=False)
@@ -47,11 +47,11 @@ def make_ready(console: Console, level: str, draws: bool = False, installs: bool
 
 
 def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool = True) -> None:
-    """Fetch the weights of the default networks and of others, if they are missing.
+    """Fetch the missing weights of the default networks and of further ones.
 
     Args:
         console: console for messages.
-        names: names of other weights.
+        names: names of further networks.
         is_verbose: whether success is reported.
     """
     from hrc_env.perception import weights
@@ -62,11 +62,11 @@ def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool
 
 
 def find_opengl(console: Console, installs: bool = True) -> OpenGL:
-    """Return whether pictures can be drawn.
+    """Return whether OpenGL can render pictures, and install it if that is allowed.
 
     Args:
         console: console for messages.
-        installs: whether Debian's OpenGL is installed if there is none and the user is root.
+        installs: whether Debian's OpenGL is installed if none is found and the user is root.
     """
     from hrc_env.scene import gl
 
@@ -86,7 +86,7 @@ def compile_kernels(console: Console, level: str | None = None, is_verbose: bool
 
     Args:
         console: console for messages.
-        level: perception level; None: all levels.
+        level: perception level; None for all levels.
         is_verbose: whether success is reported.
     """
     from hrc_env.core.kernels import ahead

@@ -1,9 +1,9 @@
-"""Level `pixels`: rendered crops through the pose network."""
+"""Level `pixels`: the pose network on rendered crops."""
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import copied, one
+from hrc_env.core.batching import copy_arrays, one
 from hrc_env.core.typing import Capsules, Floats, Ints
 from hrc_env.geometry.chains import robot_state
 from hrc_env.perception.faults.camera_film import CameraFilm, ScenePose, Shot
@@ -21,14 +21,14 @@ from hrc_env.tracking.estimators import Estimator
 
 
 class RenderedCameras(ImageSensor):
-    """Cameras with images that are rendered where windows of them are needed.
+    """Cameras of which only the needed windows are rendered.
 
     Args:
-        scene: with the rig's cameras.
+        scene: the scene with the rig's cameras.
         batch: number of environments.
-        appearance: appearance of the scene, drawn for each episode.
-        schedule: behaviour of the cameras.
-        renderer: a renderer of the same scene with any cameras; None: a new one.
+        appearance: distribution of the scene's appearance, which is drawn for each episode.
+        schedule: schedule of the cameras' images and faults.
+        renderer: a renderer of the same scene with any cameras; if None, a new one is made.
     """
 
     CHANGES = ("history", "episode_looks")
@@ -47,25 +47,25 @@ class RenderedCameras(ImageSensor):
         self.images, self.has_times = self.film, not schedule.is_plain
         self.history = History(batch, schedule)
         self.episode_looks: list[Look | None] = [None] * batch
-        """(B,) appearance of each environment in its episode; None: as it was built."""
+        """(B,) appearance of each environment's episode; None for the scene as built."""
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Forget the images of environments `ids`; draw faults and appearance."""
+        """Delete the images of environments `ids`, and draw new faults and a new appearance."""
         self.history.reset(ids, rngs)
         if self.appearance != AS_BUILT:
             for b in ids:
                 self.episode_looks[b] = draw_look(self.appearance, self.scene.n_workers, rngs[b])
 
     def robots_world(self) -> Capsules:
-        """Return the robots' capsules (B, K, 2, 3) by their encoders [m]."""
+        """Return the robots' capsules (B, K, 2, 3) according to their joint encoders [m]."""
         chain = self.scene.chain
         q = self.now.qpos[:, : chain.n_joints]
         return robot_state(chain, q, np.zeros_like(q)).capsules_world
 
     def show(self, b: int) -> Floats:
-        """Make the images present that have arrived in environment b; return their times (C,)."""
+        """Set `images` to those that have arrived in environment b, and return their times (C,)."""
         row, history = self.now.ids.tolist().index(b), self.history
-        pose = ScenePose(self.now.qpos[row].copy(), copied(one(self.now.motion, row)))
+        pose = ScenePose(self.now.qpos[row].copy(), copy_arrays(one(self.now.motion, row)))
         step = history.begin_step(b)
         before: Shot | None = history.record_at(b, step - 1)
         seed = history.seeds[b]
@@ -78,16 +78,16 @@ class RenderedCameras(ImageSensor):
 
 
 class PixelPipeline(ImageTracking):
-    """Level `pixels`: rendered crops through the pose network.
+    """The pipeline of level `pixels`, which runs the pose network on rendered crops.
 
     Args:
-        scene: with the rig's cameras.
+        scene: the scene with the rig's cameras.
         batch: number of environments.
         tracker: the estimator.
         config: settings of the environment.
-        schedule: behaviour of the cameras.
-        like: a pipeline of the same scene and detector with other cameras, which lends its
-            renderer and networks; None: there is none.
+        schedule: schedule of the cameras' images and faults.
+        like: a pipeline of the same scene and detector with other cameras that lends its renderer
+            and networks, or None.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class PixelPipeline(ImageTracking):
             detector.pose_detector.borrow_networks(like.worker_detector.pose_detector)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment b in its episode; None: as it was built."""
+        """Return the appearance of environment b's episode, or None for the scene as built."""
         return self.cameras.episode_looks[b]
 
     def schedule_of(self, b: int) -> Schedule:

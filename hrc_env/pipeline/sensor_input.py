@@ -1,4 +1,4 @@
-"""The input of sensors; pipelines know no more of the world than their measurements of it."""
+"""The input of sensors; their measurements are all that pipelines know about the world."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -13,27 +13,28 @@ from hrc_env.core.typing import Bools, Floats, Ints
 Generators: TypeAlias = list[np.random.Generator]
 """One random generator for each environment."""
 Windows: TypeAlias = list[list[Roi | None]]
-"""(W, C) window of each worker in each camera; None where there is none."""
+"""(W, C) window of each worker in each camera; None where a camera has no window."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorInput:
-    """The scene at the moment at which the shutters open; rows are environments `ids`."""
+    """The scene at the moment of exposure; the rows are the environments `ids`."""
 
     ids: Ints
     """(B,) index of each row's environment in the batch."""
     qpos: Floats
-    """(B, nq) joints of the arm [rad], then fingers and loose objects, as in `Physics.qpos`."""
+    """(B, nq) generalized positions of the arm's joints [rad], fingers and loose objects, in the
+    order of `Physics.qpos`."""
     motion: WorkerMotion
-    """(B, W, S, ...) bodies of the workers."""
+    """(B, W, S, ...) poses of the workers' bodies."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrueSensorInput(SensorInput):
-    """The scene with the truth about the workers, for sensors with `NEEDS_TRUTH` only."""
+    """The scene with the true states of the workers, only for sensors with `NEEDS_TRUTH`."""
 
     truth: WorkerTruth
-    """(B, W, ...) the workers."""
+    """(B, W, ...) true states of the workers."""
     present: Bools
     """(B, W) whether each worker is in the episode."""
 
@@ -47,11 +48,11 @@ class Sensor(Stateful):
     """The scene of the last exposure."""
 
     def expose(self, now: SensorInput) -> None:
-        """Take in the scene, which is kept until the next exposure."""
+        """Set the present scene, which the sensor keeps until the next exposure."""
         self.now = now
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Begin environments `ids` anew.
+        """Reset environments `ids`.
 
         Args:
             ids: indices of environments.
@@ -60,13 +61,13 @@ class Sensor(Stateful):
 
 
 class TrueState(Sensor):
-    """An ideal sensor, which knows the truth."""
+    """An ideal sensor, which measures the true state."""
 
     NEEDS_TRUTH = True
 
 
 def require_truth(now: SensorInput) -> TrueSensorInput:
-    """Return an input with the truth; `ConfigError` for one without."""
+    """Return an input with the truth, or raise `ConfigError` if it has none."""
     if not isinstance(now, TrueSensorInput):
         raise ConfigError(f"This sensor needs a TrueSensorInput, got a {type(now).__name__}.")
     return now

@@ -1,4 +1,4 @@
-"""The loop of tracking people with cameras: predict, detect, update, judge presence."""
+"""The loop that tracks people with cameras: it predicts, detects, updates and judges presence."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -38,19 +38,22 @@ class Detections(NamedTuple):
     """The last detections of an environment, for pictures."""
 
     keypoints: Keypoints | None
-    """(1, C, W, J, ...) keypoints by worker; None: there are no cameras."""
+    """(1, C, W, J, ...) keypoints by worker; None if there are no cameras."""
     windows: Windows
-    """(W, C) windows in which they were found; empty: there are none."""
+    """(W, C) windows in which the keypoints were found; empty if detection uses no windows."""
 
 
 class PerceptionPipeline(Stateful):
-    """A perception level with its estimator, for a batch; the base class has no cameras."""
+    """A perception level with its estimator, for a batch of environments.
+
+    The base class has no cameras.
+    """
 
     sensor: Sensor
     """The sensor, which must be exposed to the scene (`Sensor.expose`) before `perceive`."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget environments `ids`.
+        """Reset environments `ids`, for new episodes.
 
         Args:
             ids: indices of environments.
@@ -61,7 +64,7 @@ class PerceptionPipeline(Stateful):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the belief about environments `ids` after the sensor's measurement.
+        """Return the belief about environments `ids`, updated by the sensor's measurement.
 
         Args:
             ids: (B,) indices of environments.
@@ -71,12 +74,12 @@ class PerceptionPipeline(Stateful):
         raise NotImplementedError
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return the belief about a time ahead.
+        """Forecast the belief for a future time.
 
         Args:
             now: (B, W, ...) present belief about environments `ids`.
             ids: (B,) indices of environments.
-            horizon_s: the time ahead [s].
+            horizon_s: time from now to the forecast [s].
         """
         raise NotImplementedError
 
@@ -86,14 +89,17 @@ class PerceptionPipeline(Stateful):
 
     @property
     def measurements(self) -> Keypoints:
-        """Last keypoints (B, C, W, J) that the estimator got; `ConfigError` without cameras."""
+        """Last keypoints (B, C, W, J) that the estimator received.
+
+        Raises `ConfigError` if there are no cameras.
+        """
         raise ConfigError("Keypoints are of cameras, and this perception level has none.")
 
     @property
     def now_s(self) -> Floats:
         """Present time (B,) by the clock of `Keypoints.time_s` [s].
 
-        Raises `ConfigError` without cameras.
+        Raises `ConfigError` if there are no cameras.
         """
         raise ConfigError("Frames are of cameras, and this perception level has none.")
 
@@ -102,23 +108,23 @@ class PerceptionPipeline(Stateful):
         return []
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b` in its episode; None: as it was built."""
+        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
         return None
 
     def schedule_of(self, b: int) -> Schedule | None:
-        """Return the schedule of environment `b`'s cameras in its episode; None without cameras."""
+        """Return the camera schedule of environment `b`'s episode, or None without cameras."""
         return None
 
     def light_of(self, b: int) -> float:
-        """Return the strength of the light in environment `b`'s episode; 1 is as it was built."""
+        """Return the relative strength of the light in environment `b`'s episode (default 1)."""
         return 1.0
 
     def suspected_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) of environments `ids` that may be miscalibrated."""
+        """Return a mask (B, C) of the possibly miscalibrated cameras of environments `ids`."""
         return np.zeros((len(ids), 0), np.bool_)
 
     def vacancy(self, ids: Ints) -> Vacancy | None:
-        """Return the state of the floor of environments `ids`; None without cameras."""
+        """Return the state of the floor of environments `ids`, or None if there are no cameras."""
         return None
 
     def close(self) -> None:
@@ -130,21 +136,21 @@ class TrackingSetup:
     """The cameras, the people and the settings of a tracker."""
 
     cameras: tuple[PinholeCamera, ...]
-    """The rig, as it is calibrated."""
+    """Cameras of the rig, with their calibrated poses and lenses."""
     n_workers: int
     """Greatest number W of tracked people."""
     coverage: Coverage
-    """Pieces of the floor, and the cameras that would see a person there."""
+    """Patches of floor, and the cameras that would see a person on each of them."""
     dt_s: float
     """Usual time between two updates [s]."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
     """Settings of the association of poses to workers."""
     calibration: Calibration = field(default_factory=read_calibration)
-    """Calibration of the network's joints."""
+    """Calibration of the errors of the network's joints."""
 
 
 def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
-    """Return the setup for the workers of a scene."""
+    """Return the setup for tracking the workers of a scene."""
     return TrackingSetup(
         cameras=scene.cameras,
         n_workers=scene.n_workers,
@@ -156,13 +162,15 @@ def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
 
 
 class PoseTracking(PerceptionPipeline):
-    """A pipeline that tracks people with cameras: predict, detect, update, judge presence.
+    """A pipeline that tracks people with cameras.
+
+    In each step it predicts the workers, detects them, updates the estimator and judges presence.
 
     Args:
         batch: number of environments.
         setup: cameras, people and settings.
         tracker: the estimator.
-        sensor: the sensor.
+        sensor: the cameras.
     """
 
     CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
@@ -184,7 +192,7 @@ class PoseTracking(PerceptionPipeline):
         """(C, 3) principal point and focal length [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget the tracks and the images of environments `ids`."""
+        """Delete the tracks and the images of environments `ids`."""
         self.tracker.reset(self.state, ids, tracker_rngs)
         forget_monitor(self.monitored, ids)
         forget_frozen(self.frozen, ids)
@@ -195,7 +203,7 @@ class PoseTracking(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the belief about environments `ids` after the usual time; see `track`."""
+        """Return the belief about environments `ids` after the usual time between updates."""
         return self.track(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
 
     def track(
@@ -210,7 +218,7 @@ class PoseTracking(PerceptionPipeline):
             tracker_rngs: one generator for each of `ids`.
 
         Returns:
-            Belief about the workers (B, W, ...), with the slots that are tracked or unknown.
+            Belief about the workers (B, W, ...), including which slots are tracked or unknown.
         """
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
@@ -238,35 +246,35 @@ class PoseTracking(PerceptionPipeline):
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 
     def cameras_with_others(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) with people besides the workers in their last search.
+        """Return a mask (B, C) of cameras that found people besides workers in the last search.
 
-        There are none where keypoints hold all people.
+        The base class returns False, because its keypoints contain all people.
         """
         return np.zeros((len(ids), len(self.setup.cameras)), np.bool_)
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction without the tracks that are given up; the base class keeps all."""
+        """Return a prediction without the tracks of given-up slots; the base class keeps all."""
         return expected
 
     def others(self, ids: Ints) -> Others:
-        """Return the people beyond the slots; the base class knows none."""
+        """Return the people without a slot; the base class knows none."""
         return no_others(len(ids))
 
     def vacancy(self, ids: Ints) -> Vacancy:
-        """Return the state of the floor."""
+        """Return the state of the floor of environments `ids`."""
         return self.presence.vacancy(ids)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) with whole images that have been searched for people.
+        """Return a mask (B, C) of the cameras that have searched a whole image for people.
 
         Args:
             ids: (B,) indices of environments.
-            age_s: (B, C) ages of the images [s]; NaN: there is none.
+            age_s: (B, C) ages of the images [s]; NaN for cameras without an image.
         """
         return np.isfinite(age_s)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return the estimator's forecast, with the present belief about presence."""
+        """Return the estimator's forecast; the belief about presence stays that of the present."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
@@ -274,34 +282,34 @@ class PoseTracking(PerceptionPipeline):
         return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Return the keypoints of people in pixels of the images, without identities.
+        """Detect the keypoints of people in image pixels, without their identities.
 
         Args:
             ids: (B,) indices of environments.
-            expected: (B, W, ...) the tracker's prediction.
+            expected: (B, W, ...) prediction of the tracker.
             sensor_rngs: one generator for each of `ids`.
         """
         raise NotImplementedError
 
     def _associate(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
-        """Return keypoints by worker; a single worker gets all of them."""
+        """Assign keypoints to the workers; a single worker gets all of them."""
         if self.setup.n_workers < 2:
             return keypoints
         return associate(self.P, keypoints, expected, self.setup.association).keypoints
 
     def suspected_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) of environments `ids` that may be miscalibrated."""
+        """Return a mask (B, C) of the possibly miscalibrated cameras of environments `ids`."""
         return self.monitored["suspected"][ids] | self.presence.find_contradicting_cameras(ids)
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
-        """Return the ages (B, C) of the images by their own times [s]; NaN: there is none."""
+        """Return the ages (B, C) of the images by their timestamps [s]; NaN without an image."""
         if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
         return self.steps[ids, None] * self.setup.dt_s - keypoints.time_s
 
     @property
     def measurements(self) -> Keypoints:
-        """Last keypoints (B, C, W, J) that the estimator got."""
+        """Last keypoints (B, C, W, J) that the estimator received."""
         return self.keypoints
 
     @property
@@ -315,6 +323,6 @@ class PoseTracking(PerceptionPipeline):
 
 
 def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
-    """Return keypoints of which no camera has any."""
+    """Return empty keypoints: no camera has detected a joint."""
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))

@@ -1,4 +1,4 @@
-"""Detection of every worker of a scene, by windows at predicted places and by searches."""
+"""Detection of all workers of a scene, in windows at predicted positions and by searches."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,7 +21,7 @@ from hrc_env.pipeline.sensor_input import Windows
 
 
 class ExpectedPosture(NamedTuple):
-    """The posture in which a worker is expected."""
+    """The posture that a worker is expected to have."""
 
     is_folded: bool
     """Whether the worker is expected to be folded (`outline.is_folded`)."""
@@ -35,23 +35,23 @@ class Crops(NamedTuple):
     windows: Views
     """(C,) window of each camera."""
     images: list[Image | None]
-    """(C,) crop of each window, as the network got it."""
+    """(C,) crop of each window, as it was given to the network."""
 
 
 class WorkerDetector(Stateful):
     """A detector of the workers of a batch of environments in the images of a rig.
 
-    Tracked workers are detected in windows at their predicted places, others by searches of whole
-    images.
+    Tracked workers are detected in windows at their predicted positions, others by searches of
+    whole images.
 
     Args:
         batch: number B of environments.
         cameras: the rig.
         n_workers: number W of workers.
         config: settings of the detector.
-        floor_world: (N, 3) points where people may stand, for the layout of searches [m]; None:
-            unknown.
-        error: table `sigma` of a calibration, from which standard deviations follow.
+        floor_world: (N, 3) points where people may stand, for the layout of searches [m]; None if
+            they are unknown.
+        error: table `sigma` of a calibration, which gives the reported standard deviations.
     """
 
     CHANGES = ("pose_detector", "windows", "schedule", "reacquisition", "bystanders", "unexplained")
@@ -78,7 +78,7 @@ class WorkerDetector(Stateful):
         """(B, C) whether a camera's last search found a person that is neither a worker nor one of
         the `bystanders`."""
         self.last_crops: dict[int, Crops] = {}
-        """Last crops of each environment's first worker, for pictures; they are no state."""
+        """Last crops of each environment's first worker, for pictures; not part of the state."""
 
     def detect(
         self,
@@ -91,17 +91,17 @@ class WorkerDetector(Stateful):
     ) -> None:
         """Detect every worker of environment b.
 
-        Workers with a window come first; one search serves all the others. Workers in view
-        of cameras without an image only are left out.
+        Workers with a window are detected first; one search serves all others. Workers are skipped
+        if only cameras without an image could see them.
 
         Args:
             source: the present images.
-            expected: (W, ...) the tracker's prediction.
-            b: the environment.
+            expected: (W, ...) prediction of the tracker.
+            b: index of the environment.
             has_image: (C,) whether each camera has an image now.
-            out: (C, W, ...) is filled with keypoints.
-            robot_world: (K, 2, 3) the robot's capsules [m]; if there are more people than slots,
-                those nearest to it get one. None: those that were tracked first.
+            out: (C, W, ...) keypoints, which are filled in.
+            robot_world: (K, 2, 3) the robot's capsules [m]. If there are more people than slots,
+                those nearest to the robot get a slot; if None, those that were tracked first.
         """
         self.schedule.tick(b)
         self.bystanders.tick(b)
@@ -141,9 +141,9 @@ class WorkerDetector(Stateful):
             self.schedule.rest(b)
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction of environments `ids` without the tracks that are given up.
+        """Return a prediction of environments `ids` without the tracks of given-up slots.
 
-        These lose their slots to people nearer to the robot.
+        These slots are given to people nearer to the robot.
         """
         given_up = self.bystanders.given_up[ids] > 0
         return (
@@ -151,11 +151,11 @@ class WorkerDetector(Stateful):
         )
 
     def searched_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) with images that were just searched and are not blank."""
+        """Return a mask (B, C) of cameras with images that were just searched and are not blank."""
         return (self.schedule.ages[ids] == 0) & ~self.schedule.blank[ids]
 
     def forget(self, b: int) -> None:
-        """Forget the workers of environment b."""
+        """Delete all data about the workers of environment b."""
         self.unexplained[b] = False
         self.schedule.reset(b)
         self.bystanders.forget(b)
@@ -175,18 +175,18 @@ class WorkerDetector(Stateful):
         self.pose_detector.close()
 
     def _search(self, source: ImageSource, b: int, cameras: Sequence[int]) -> Candidates:
-        """Search the images of cameras, and return the people (C,) of all recent searches."""
+        """Search the images of cameras, and return the people (C,) found by all recent searches."""
         found = self.pose_detector.search(source, cameras)
         return self.schedule.remember(b, cameras, found, self.pose_detector.blank)
 
     def _explain(self, b: int, beside: Sequence[Sighting], no_vacancy: bool) -> None:
-        """Note the searched cameras that show an unexplained person.
+        """Update `unexplained` for the cameras that have been searched.
 
         Args:
-            b: the environment.
-            beside: people besides the workers.
-            no_vacancy: whether all slots are tracked; a person then counts only if no other camera
-                agrees.
+            b: index of the environment.
+            beside: sightings of people besides the workers.
+            no_vacancy: whether all slots are tracked; a person is then unexplained only if a single
+                camera has detected it.
         """
         for c in np.flatnonzero(self.schedule.ages[b] == 0).tolist():
             shown = [one for one in beside if one.windows[c] is not None]
@@ -195,7 +195,7 @@ class WorkerDetector(Stateful):
     def _keep(
         self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints
     ) -> None:
-        """Write the detection of a worker into keypoints (C, W, ...), and keep its windows."""
+        """Copy the detection of a worker to keypoints (C, W, ...), and store its windows."""
         out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
         out.sigma_px[:, worker] = seen.sigma_px
         for c, has in enumerate(has_image):
@@ -217,9 +217,9 @@ class WorkerDetector(Stateful):
 
         Args:
             source: the present images.
-            b: the environment.
-            worker: the worker.
-            windows: (C,) windows by the track.
+            b: index of the environment.
+            worker: index of the worker.
+            windows: (C,) windows predicted by the track.
             taken: windows (C,) of other workers.
             has_image: (C,) whether each camera has an image now.
         """
@@ -235,7 +235,7 @@ class WorkerDetector(Stateful):
         return b * self.n_workers + worker
 
     def _predict_windows(self, expected: PoseEstimate, worker: int) -> Views:
-        """Return a worker's window in each camera (C,); None without a track or out of view."""
+        """Return a worker's window in each camera (C,), or None without a track or out of view."""
         if not expected.tracked[worker]:
             return [None] * len(self.cameras)
         px, depth_m = project(self.P, expected.mean_world[worker : worker + 1])
@@ -243,7 +243,7 @@ class WorkerDetector(Stateful):
 
 
 def _expected_posture(expected: PoseEstimate, worker: int) -> ExpectedPosture:
-    """Return the posture in which a worker is expected; without a track, standing."""
+    """Return the expected posture of a worker, which is standing if there is no track."""
     if not expected.tracked[worker]:
         return ExpectedPosture(False, STANDING)
     joints = expected.mean_world[worker]

@@ -1,1 +1,1 @@
-"""Pictures for people."""
+"""Pictures of simulations for users."""

@@ -1,4 +1,4 @@
-"""A film's frame: the scene beside the four cameras, the belief, and the separation."""
+"""Frames of videos, which show the scene, four cameras, the belief and the separation."""
 
 from collections.abc import Mapping
 from typing import TypeAlias
@@ -21,23 +21,23 @@ ROOM = (792, 716)
 TILE = (400, 225)
 """Width and height of a camera's picture [px]."""
 RIGHT_X = WIDTH - 2 * TILE[0] - 4
-"""Left edge of the pictures on the right [px]."""
+"""Left edge of the pictures in the right part of a frame [px]."""
 TITLE_Y = 2 * TILE[1] + 22
-"""Upper edge of the title on the right [px]."""
+"""Upper edge of the title in the right part of a frame [px]."""
 CROP = 196
-"""Side of a crop [px]."""
+"""Side of a displayed crop [px]."""
 BELIEF = (400, 214)
 """Width and height of a picture of the belief [px]."""
 LEGEND_HEIGHT = 28
 """Height of the legend [px]."""
 STRIP_HEIGHT = 180
-"""Height of the strip below [px]."""
+"""Height of the strip with the curves at the bottom of a frame [px]."""
 STRIP_S = 10.0
 """Duration that the strip shows [s]."""
 FAR_M = 1.5
-"""Largest distance that is drawn [m]."""
+"""Greatest distance that the strip shows [m]."""
 LEFT, RIGHT, TOP, BOTTOM = 290, WIDTH - 20, 14, STRIP_HEIGHT - 14
-"""Edges of the curves in the strip [px]."""
+"""Edges of the area of the curves in the strip [px]."""
 NEAR = (150, 30, 40)
 """Colour of steps with a cost below 2."""
 TOUCHING = (255, 40, 60)
@@ -45,12 +45,12 @@ TOUCHING = (255, 40, 60)
 
 
 class Moment:
-    """Values of one step in the strip."""
+    """Values of one step, which the strip shows."""
 
     true_m: float
     """True separation [m]."""
     estimated_m: float
-    """Separation by the robot's belief [m]."""
+    """Separation estimated from the robot's belief [m]."""
     error_m: float
     """Error of the tracked joints [m]; NaN without a track."""
     cost: float
@@ -65,13 +65,13 @@ Diary: TypeAlias = Records1[Moment]
 def compose(
     views: Views, diary: Diary, counts: Mapping[str, float], seen: Glance | None = None
 ) -> Image:
-    """Return a frame (900, 1600, 3): scene, cameras, crops or belief, and strip.
+    """Return a frame (900, 1600, 3) with scene, cameras, crops or belief, and strip.
 
     Args:
-        views: views of the simulation, which may have advanced.
-        diary: (T,) the moments of the episode up to the frame.
+        views: views of the simulation, which may have advanced since `seen`.
+        diary: (T,) moments of the episode up to the frame.
         counts: numbers of successful and failed attempts up to the frame.
-        seen: the last moment of the diary; None for the present one.
+        seen: copy of the state that the frame shows; None for the present state.
     """
     seen = seen or views.glance()
     level, config = views.simulation.perception, views.simulation.config
@@ -97,7 +97,7 @@ def compose(
 
 
 def legend(level: str) -> Image:
-    """Return (28, 792, 3) the legend of the colours at a perception level."""
+    """Return the legend (28, 792, 3) of the colours at a perception level."""
     image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
         ("worker's left", overlay.LEFT, "line"),
@@ -122,10 +122,10 @@ def legend(level: str) -> Image:
 
 
 def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float) -> Image:
-    """Return the strip: true and estimated separation over the last seconds, and the cost.
+    """Return the strip, which shows true and estimated separation and the cost of recent steps.
 
     Args:
-        diary: (T,) the moments of the episode.
+        diary: (T,) moments of the episode.
         counts: numbers of successful and failed attempts.
         dt_s: duration of a step [s].
         limit_m: separation below which a step has a cost [m].
@@ -165,16 +165,16 @@ def _axes(limit_m: float) -> Image:
 
 
 def _y_of(metres: Floats) -> Floats:
-    """Return the rows of distances in the strip [px]."""
+    """Return the pixel rows of distances in the strip [px]."""
     return np.round(BOTTOM - (BOTTOM - TOP) * np.clip(metres, 0, FAR_M) / FAR_M)
 
 
 def _panel(height: int, width: int) -> Image:
-    """Return a dark picture."""
+    """Return a uniformly dark picture."""
     return np.full((height, width, 3), overlay.PANEL, np.uint8)
 
 
 def _paste(frame: Image, picture: Image, corner: overlay.Pixel) -> None:
-    """Copy a picture into a frame, its upper left corner at x, y."""
+    """Copy a picture into a frame, with its upper left corner at the pixel `corner`."""
     x, y = corner[0], corner[1]
     frame[y : y + picture.shape[0], x : x + picture.shape[1]] = picture

@@ -1,4 +1,4 @@
-"""Marks in pictures beside the scene: markers of the task, and capsules of robot and people."""
+"""Marks that are drawn over the scene: markers of the task, capsules of robot and people."""
 
 from dataclasses import dataclass
 
@@ -16,11 +16,11 @@ from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 
 OVERLAYS = ("capsules",)
-"""Overlays of a picture of the scene."""
+"""Names of the overlays that pictures of the scene may have."""
 MARKER_M = 0.05
 """Radius of a marker [m]."""
 MARKER_PX = 4
-"""Least radius of a marker in a picture [px]."""
+"""Minimum radius of a marker in a picture [px]."""
 MARKER_SHOWN = 0.8
 """Opacity of visible markers."""
 MARKER_HIDDEN = 0.3
@@ -34,9 +34,9 @@ COLOURS = {
     "people, estimated": overlay.BELIEF,
     "people, true": overlay.RIGHT,
 }
-"""Colours of capsules by their group."""
+"""Colours of the capsules by their group."""
 LEGEND_FROM_PX = 320
-"""Least width of pictures with a legend [px]."""
+"""Minimum width of pictures with a legend [px]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,17 +46,17 @@ class Solids:
     group: str
     """Name of the group, a key of `COLOURS`."""
     ends_world: Capsules
-    """(N, 2, 3) end points of their axes [m]."""
+    """(N, 2, 3) end points of the capsules' axes [m]."""
     radius_m: Floats
-    """(N,) radii [m]."""
+    """(N,) radii of the capsules [m]."""
 
 
 def find_solids(simulation: Simulation, b: int) -> tuple[Solids, ...]:
-    """Return the capsules of environment `b`.
+    """Return the capsules of robot and people in environment `b`, by group.
 
-    Shields, rewards and the observed separation use those of the robot with its load and of people
-    by the estimate, which has none for a worker without a track. Costs, contacts and
-    `info["safety/..."]` use those of the robot and the true ones of people.
+    Shields, rewards and the observed separation use the capsules of the robot with its load and of
+    the estimated people; workers without a track have no estimated capsules. Costs, contacts and
+    `info["safety/..."]` use the capsules of the robot and of the true people.
     """
     robot, estimate = simulation.belief.robot, one(simulation.estimate, b)
     believed = segments(estimate.mean_world[estimate.tracked])
@@ -90,7 +90,7 @@ def mark_solids(solids: tuple[Solids, ...]) -> Marks:
 
 
 def mark_points(points_world: Points3, camera: PinholeCamera) -> Marks:
-    """Return a sphere round each point (M, 3) [m] as marks of a camera's picture."""
+    """Return spheres around points (M, 3) [m] as marks of a camera's picture."""
     depth_m = (points_world - camera.eye_world) @ camera.T_world_from_cam[:3, 2]
     radius_m = np.maximum(MARKER_M, MARKER_PX * depth_m / camera.K[0, 0])
     rgb = np.tile(np.array(overlay.GOAL) / 255, (len(points_world), 1))
@@ -98,7 +98,7 @@ def mark_points(points_world: Points3, camera: PinholeCamera) -> Marks:
 
 
 def draw_legend(image: Image, solids: tuple[Solids, ...]) -> None:
-    """Write the groups of capsules in their colours into a picture."""
+    """Draw a legend with the groups of capsules, in their colours, in a picture."""
     height, width = image.shape[:2]
     if width < LEGEND_FROM_PX:
         return

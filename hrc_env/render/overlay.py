@@ -1,4 +1,4 @@
-"""Drawings over pictures: estimates, keypoints, crops, markers and text."""
+"""Drawing of estimates, keypoints, crops, markers and text over pictures."""
 
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
@@ -37,11 +37,11 @@ ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
 SHIELD: Colour = (255, 90, 60)
-"""Colours of the drawings."""
+"""Colour of the shield's frame and label; the constants above are the colours of other drawings."""
 FLOOR_M = 3
-"""Half side of the grid on the floor [m]."""
+"""Half the side of the grid on the floor [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
-"""Colours of bones by the sides of their ends; bones across have `MIDDLE`."""
+"""Colours of bones with both ends on the same side of the body; other bones have `MIDDLE`."""
 
 
 class Projection(NamedTuple):
@@ -56,12 +56,12 @@ class Projection(NamedTuple):
 def draw_estimate(
     image: Image, camera: PinholeCamera, estimate: PoseEstimate, thickness: int = 2
 ) -> None:
-    """Draw the estimated skeletons with 2-sigma ellipses; workers without a track are left out.
+    """Draw the estimated skeletons of tracked workers, with 2-sigma ellipses.
 
     Args:
-        image: (H, W, 3) picture of the camera, of any size with its aspect; it is changed.
+        image: (H, W, 3) picture of the camera, of any size with its aspect ratio; it is changed.
         camera: the camera.
-        estimate: estimate of one environment, a batch of one.
+        estimate: estimate of a single environment, as a batch of one.
         thickness: thickness of the lines [px].
     """
     scale = image.shape[1] / camera.width_px
@@ -76,7 +76,7 @@ def draw_estimate(
 
 
 def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int) -> None:
-    """Draw the joints that camera `index` detected, fainter for a lower confidence."""
+    """Draw the joints that camera `index` detected, fainter where the confidence is lower."""
     scale = image.shape[1] / camera.width_px
     px = image_from_pinhole(camera, keypoints.px[0, index].reshape(-1, 2)) * scale
     known = np.isfinite(px).all(-1)
@@ -85,7 +85,7 @@ def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, in
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
-    """Draw the outline of a crop."""
+    """Draw the outline of a crop's window in a picture of the camera."""
     scale = image.shape[1] / camera.width_px
     box = (
         (window.centre_px[0] * scale, window.centre_px[1] * scale),
@@ -115,7 +115,7 @@ def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Fl
 
 
 def draw_floor(image: Image, camera: PinholeCamera, middle: Floats) -> None:
-    """Draw a grid of metres on the floor round a point (3,) [m]."""
+    """Draw a grid with lines 1 m apart on the floor around a point (3,) [m]."""
     foot = np.array([middle[0], middle[1], 0.0])
     for k in range(-FLOOR_M, FLOOR_M + 1):
         line = np.array([(-FLOOR_M, k, 0), (FLOOR_M, k, 0)])
@@ -131,9 +131,9 @@ def draw_path(
     Args:
         image: a picture of the camera, which is changed.
         camera: the camera.
-        points: (N, 3) the points [m].
+        points: (N, 3) points of the polyline [m].
         colour: colour of the line.
-        thickness: its thickness [px].
+        thickness: thickness of the line [px].
     """
     px, depth_m = _project(image, camera, points)
     if (depth_m >= 0.1).all():
@@ -141,7 +141,7 @@ def draw_path(
 
 
 def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
-    """Draw a ring round each point (M, 3) [m], over the objects in front of it."""
+    """Draw a ring around each point (M, 3) [m], also where objects occlude the point."""
     px, depth_m = _project(image, camera, markers_world)
     focal_px = camera.K[0, 0] * image.shape[1] / camera.width_px
     for middle, away_m in zip(_fixed(px), depth_m.tolist(), strict=True):
@@ -152,7 +152,7 @@ def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> 
 
 
 def draw_shield(image: Image, change_rad_s: float) -> None:
-    """Draw a frame and a label if the shield's change of the command counts as active [rad/s]."""
+    """Draw a frame and a label if the shield's change of the command [rad/s] counts as active."""
     if change_rad_s > ACTIVE_RAD_S:
         height, width = image.shape[:2]
         thickness = max(2, width // 240)
@@ -164,12 +164,12 @@ def draw_shield(image: Image, change_rad_s: float) -> None:
 
 
 def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Write a text on a dark plate.
+    """Draw a text on a dark background.
 
     Args:
         image: the picture, which is changed.
         text: the text.
-        corner: upper left corner of the plate.
+        corner: upper left corner of the background.
         size: size of the font [px].
         colour: colour of the text.
     """
@@ -181,7 +181,7 @@ def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour
 
 
 def write(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Write a text.
+    """Draw a text in a picture.
 
     Args:
         image: the picture, which is changed.
@@ -203,12 +203,12 @@ def text_width(text: str, size: int = 16) -> int:
 
 
 def panel(width: int, height: int) -> Image:
-    """Return a dark picture."""
+    """Return a uniformly dark picture."""
     return np.full((height, width, 3), PANEL, np.uint8)
 
 
 def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
-    """Return pictures of one size in rows, with dark seams."""
+    """Return a picture that shows pictures of equal size in rows, with dark gaps between them."""
     height, width = pictures[0].shape[:2]
     rows = -(-len(pictures) // columns)
     sheet = panel(columns * (width + gap) - gap, rows * (height + gap) - gap)
@@ -219,7 +219,7 @@ def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
 
 
 def shrink(image: NDArray[Any], width: int, height: int) -> Image:
-    """Return an image in a smaller size; its pixels are means of the original ones."""
+    """Shrink an image; the new pixels are means of the original ones."""
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
@@ -230,7 +230,7 @@ def middle_rows(image: Image, height: int) -> Image:
 
 
 def _project(image: Image, camera: PinholeCamera, points: Floats) -> Projection:
-    """Return points (N, 3) [m] in a picture of a camera."""
+    """Project points (N, 3) [m] into a picture of a camera."""
     px, depth_m = project(camera.P[None], points[None])
     scale = image.shape[1] / camera.width_px
     return Projection(image_from_pinhole(camera, px[0, 0]) * scale, depth_m[0, 0])
@@ -239,14 +239,14 @@ def _project(image: Image, camera: PinholeCamera, points: Floats) -> Projection:
 def _ellipses(
     image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
-    """Draw the images of 2-sigma regions of joints, to first order.
+    """Draw the projected 2-sigma regions of joints, to first order.
 
     Args:
         image: a picture of the camera, which is changed.
         camera: the camera.
-        joints: (J, 3) the joints [m].
-        covariances: (J, 3, 3) their covariances [m^2].
-        scale: pixels of the picture for a pixel of the camera.
+        joints: (J, 3) positions of the joints [m].
+        covariances: (J, 3, 3) covariances of the joints [m^2].
+        scale: ratio of the picture's size to that of the camera's image.
     """
     R_cam_from_world = camera.T_world_from_cam[:3, :3].T
     x, y, z = ((joints - camera.eye_world) @ R_cam_from_world.T).T
@@ -277,7 +277,7 @@ def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
 
 
 def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
-    """Draw joints (N, 2) [px], fainter for a lower confidence (N,)."""
+    """Draw joints (N, 2) [px], fainter where the confidence (N,) is lower."""
     for pixel, share_sure in zip(_fixed(points), confidence.tolist(), strict=True):
         share = 0.35 + 0.65 * share_sure
         colour = [round(p + share * (q - p)) for p, q in zip(PANEL, DETECTED, strict=True)]
@@ -291,14 +291,14 @@ def _lines(image: Image, points: Points2, colour: Colour, thickness: int) -> Non
 
 
 def _fixed(points: Points2) -> list[Pixel]:
-    """Return points (N, 2) in 1/16 px from the centre of the first pixel, as OpenCV takes them."""
+    """Convert points (N, 2) to OpenCV's units: 1/16 px from the centre of the first pixel."""
     limited = np.clip(points - 0.5, -30000, 30000)
     return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
 
 
 @lru_cache(maxsize=256)
 def _ink(text: str, size: int) -> NDArray[np.float32]:
-    """Return (H, W, 1) the opacity of a text, from 0 to 1."""
+    """Return the opacity (H, W, 1) of a text, from 0 to 1."""
     font = _font(size)
     _, _, right, bottom = font.getbbox(text)
     drawn = PillowImage.new("L", (round(right) + 2, round(bottom) + 2))
@@ -308,7 +308,7 @@ def _ink(text: str, size: int) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=16)
 def _font(size: int) -> ImageFont.FreeTypeFont:
-    """Return DejaVu Sans, which comes with matplotlib."""
+    """Return the font DejaVu Sans, which is part of matplotlib."""
     from matplotlib import get_data_path
 
     return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

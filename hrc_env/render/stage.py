@@ -1,7 +1,8 @@
-"""Fast pictures from fixed viewpoints: moving geoms over a stored picture of the static ones.
+"""Fast rendering from fixed viewpoints: moving geoms over a stored picture of the static ones.
 
-Static geoms are drawn once, larger than the picture and with their shadows; then only the robot and
-the workers are drawn, where they are. Their shadows come from a picture of them from the sun.
+Static geoms are rendered once, with their shadows and at a multiple of the picture's size. After
+that, only the part of the picture with the robot and the workers is rendered. Shadows of moving
+geoms are computed from a picture of these geoms from the sun.
 """
 
 from collections.abc import Hashable
@@ -21,7 +22,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, Marks
 
 SMOOTHING = 2
-"""Factor by which pictures are drawn larger, for smooth edges."""
+"""Factor by which the rendering is larger than the picture, for smooth edges."""
 QUALITY = {
     "offsamples": 0,
     "shadowsize": 4096,
@@ -29,17 +30,17 @@ QUALITY = {
     "numstacks": 5,
     "numquads": 1,
 }
-"""MuJoCo's visual quality of these pictures."""
+"""MuJoCo's settings of the visual quality of these pictures."""
 SUN_PX = 256
-"""Side of the picture from the sun."""
+"""Side of the picture from the sun [px]."""
 BIAS_M = 0.03
-"""Least distance along the light from an object to its shadow [m]."""
+"""Minimum distance along the light from an object to its shadow [m]."""
 SOFT_PX = 3
-"""Width of the soft edges of shadows [px]."""
+"""Width of the blurred edges of shadows [px]."""
 COARSE = 2
-"""Step of the pixels for which shadows are computed, in both directions [px]."""
+"""Spacing of the pixels for which shadows are computed, in both directions [px]."""
 Depths: TypeAlias = NDArray[np.float32]
-"""Depths or distances of pixels."""
+"""Depth values or distances of pixels."""
 
 
 class Box(NamedTuple):
@@ -50,9 +51,9 @@ class Box(NamedTuple):
     top: int
     """First row."""
     right: int
-    """Column behind the last one."""
+    """Last column plus one."""
     bottom: int
-    """Row behind the last one."""
+    """Last row plus one."""
 
     @property
     def is_empty(self) -> bool:
@@ -61,12 +62,12 @@ class Box(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """A drawn part of the scene, `SMOOTHING` times as large as the picture, top row first."""
+    """A rendered part of the scene, `SMOOTHING` times as large as in the picture, top row first."""
 
     rgb: Image
-    """Colours; black where there is nothing."""
+    """Colours; black where nothing is rendered."""
     z: Depths
-    """Depths from 1 near to 0 far, and where there is nothing."""
+    """Depths from 1 (near) to 0 (far, or nothing rendered)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,16 +75,16 @@ class Shade:
     """A picture of the moving geoms from the sun."""
 
     z: Depths
-    """(SUN_PX, SUN_PX) depths: 1 at `begin_m` along the light, 0 at `deep_m` beyond and where there
-    is nothing."""
+    """(SUN_PX, SUN_PX) depths: 1 at the near plane, 0 at the far plane and where there is no
+    geom."""
     begin_m: float
     """Coordinate of the near plane along the light [m]."""
     deep_m: float
     """Distance of the far plane from the near plane [m]."""
     corner: tuple[float, float]
-    """Coordinates of the first pixel's corner, right and down in `sun_axes` [m]."""
+    """Coordinates of the first pixel's corner along the right and down axes of `sun_axes` [m]."""
     step_m: float
-    """Side of a pixel [m]."""
+    """Side length of a pixel [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,22 +92,23 @@ class _Backdrop:
     """A stored picture of the static geoms."""
 
     rgb: Image
-    """Colours in the picture's size."""
+    """Colours, in the picture's size."""
     z: Depths
-    """Depths from 1 near to 0 far, `SMOOTHING` times as large."""
+    """Depths from 1 (near) to 0 (far), in `SMOOTHING` times the picture's size."""
     dark: Image | None
-    """The picture without the sun; None for pictures without shadows."""
+    """Picture without the sun's light; None for pictures without shadows."""
     spots: tuple[NDArray[np.floating], ...]
-    """Points of the picture in the sun's axes: right, down and along, (h, w) each [m]."""
+    """Coordinates of the picture's points in the sun's axes (right, down, along the light), (h, w)
+    each [m]."""
 
 
 class Stage(Canvas):
-    """Renderer of pictures from a few viewpoints; static geoms are drawn once for each.
+    """A renderer of pictures from a few viewpoints, which renders static geoms once for each.
 
     Args:
         scene: the scene.
-        width: greatest width of a picture [px].
-        height: greatest height of a picture [px].
+        width: maximum width of a picture [px].
+        height: maximum height of a picture [px].
     """
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
@@ -114,7 +116,7 @@ class Stage(Canvas):
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
         self._shade: Shade | None = None
-        """Picture from the sun in the present pose, once it has been drawn."""
+        """Picture from the sun in the present pose; None until it is rendered."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose the moving geoms.
@@ -127,7 +129,7 @@ class Stage(Canvas):
         self._shade = None
 
     def picture(self, camera: PinholeCamera, shadows: bool = False) -> Image:
-        """Return the picture of a pinhole camera, in the size of its image."""
+        """Render the picture of a pinhole camera, in the size of the camera's image."""
         key = _key(camera, shadows)
         if key not in self._kept:
             self._kept[key] = self._draw_still(camera, shadows)
@@ -178,16 +180,16 @@ class Stage(Canvas):
         raise KeyError(camera.name)
 
     def draw_moving(self, camera: PinholeCamera, box: Box) -> Layer:
-        """Return the moving geoms within a box of the picture."""
+        """Render the moving geoms within a box of the picture."""
         self.show(MOVING)
         return self._read_box(camera, box)
 
     def find_box(self, camera: PinholeCamera) -> Box:
-        """Return a box of the picture that contains the moving geoms."""
+        """Return a box of the picture that contains all moving geoms."""
         return _bound_spheres(camera, *self.find_moving_spheres())
 
     def draw_shade(self) -> Shade | None:
-        """Return a picture of the moving geoms from the sun; None without a sun or such geoms."""
+        """Render the moving geoms as seen from the sun; None without a sun or moving geoms."""
         self.show(BEFORE_THE_SUN)
         axes, (middles, radii_m) = self.sun_axes(), self.find_moving_spheres()
         if axes is None or not len(middles):
@@ -206,7 +208,7 @@ class Stage(Canvas):
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
     def _draw_still(self, camera: PinholeCamera, shadows: bool) -> _Backdrop:
-        """Return a picture of the static geoms."""
+        """Render the backdrop of a camera: a picture of the static geoms."""
         size, axes = (camera.width_px, camera.height_px), self.sun_axes()
         whole = Box(0, 0, *size)
         self.show(STILL, shadows=shadows)
@@ -221,7 +223,7 @@ class Stage(Canvas):
         return _Backdrop(shrink(rgb, *size), z, dark, spots)
 
     def _read_box(self, camera: PinholeCamera, box: Box) -> Layer:
-        """Return the chosen part of the scene within a box of the picture."""
+        """Render the currently selected geoms within a box of the picture."""
         width, height = box.right - box.left, box.bottom - box.top
         middle = (box.left + box.right) / 2, (box.top + box.bottom) / 2
         self.aim(camera, Roi(middle, float(width), 0.0), height)
@@ -231,7 +233,7 @@ class Stage(Canvas):
         return Layer(np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1]))
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
-        """Replace the backdrop by the one without the sun in the shadows of moving geoms."""
+        """Darken a picture in the shadows of moving geoms, as in the backdrop without the sun."""
         shade = self._shade = self._shade or self.draw_shade()
         if shade is None:
             return
@@ -253,7 +255,7 @@ class Stage(Canvas):
 
 
 def _key(camera: PinholeCamera, shadows: bool) -> tuple[Hashable, ...]:
-    """Return the key of a backdrop."""
+    """Return the key under which the backdrop of a camera is stored."""
     view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
     return (*view, camera.width_px, camera.height_px, shadows)
 
@@ -263,8 +265,8 @@ def _bound_spheres(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> 
 
     Args:
         camera: the camera.
-        middles: (N, 3) middles of the spheres [m].
-        radii_m: (N,) their radii [m].
+        middles: (N, 3) centres of the spheres [m].
+        radii_m: (N,) radii of the spheres [m].
     """
     size = camera.width_px, camera.height_px
     x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
@@ -282,7 +284,7 @@ def _bound_spheres(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> 
 
 
 def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
-    """Return (2,) the least and greatest image coordinate of spheres, in focal lengths."""
+    """Return the minimum and maximum image coordinates (2,) of spheres, in focal lengths."""
     nearest, furthest = depth - radii_m, depth + radii_m
     low = np.minimum((x - radii_m) / nearest, (x - radii_m) / furthest)
     high = np.maximum((x + radii_m) / nearest, (x + radii_m) / furthest)
@@ -290,7 +292,7 @@ def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
 
 
 def _points(camera: PinholeCamera, depth_m: Depths) -> Depths:
-    """Return (H, W, 3) the points in the world of a picture's pixels [m]."""
+    """Return the world coordinates (H, W, 3) of the points that the pixels show [m]."""
     x = (np.arange(camera.width_px) + 0.5 - camera.K[0, 2]) / camera.K[0, 0] * depth_m
     y = (np.arange(camera.height_px) + 0.5 - camera.K[1, 2])[:, None] / camera.K[1, 1] * depth_m
     points = np.stack([x, y, depth_m], -1) @ camera.T_world_from_cam[:3, :3].T + camera.eye_world
@@ -298,11 +300,11 @@ def _points(camera: PinholeCamera, depth_m: Depths) -> Depths:
 
 
 def _lay_over(image: Image, backdrop: _Backdrop, box: Box, layer: Layer) -> None:
-    """Draw a layer over a picture where it is nearer, with smooth edges.
+    """Draw a layer over a picture where it is nearer to the camera, with smooth edges.
 
     Args:
         image: the picture, which is changed.
-        backdrop: the static geoms in it.
+        backdrop: backdrop of the picture, with the depths of the static geoms.
         box: box of the layer in the picture.
         layer: the moving geoms.
     """

@@ -1,4 +1,4 @@
-"""Pictures of a simulation: the scene, the cameras with detections, and the belief."""
+"""Pictures of a simulation: of the scene, the cameras with detections, and the belief."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one, rows
-from hrc_env.core.errors import unknown, whole
+from hrc_env.core.errors import check_integer, make_unknown_name_error
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.env_config import PICTURE_SIZE
@@ -43,61 +43,65 @@ from hrc_env.scene.rig import make_cameras
 from hrc_env.simulation import Simulation
 
 SMALLEST_PX = 16
-"""Least width and height of a picture [px]."""
+"""Minimum width and height of a picture [px]."""
 LARGEST_PX = 4096
-"""Greatest width and height of a picture [px]."""
+"""Maximum width and height of a picture [px]."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
-"""MuJoCo's visual quality of pictures of depths."""
+"""MuJoCo's settings of the visual quality of depth images."""
 MOSAIC_TILE = (640, 360)
 """Width and height of a camera's picture in a mosaic [px]."""
 SIDES = (
     ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
     ("from the side", np.array([0.0, -4.2, 1.4]), np.array([0.0, 0.0, 0.9])),
 )
-"""Viewpoints of the belief: eye and target from the robot's foot [m]."""
+"""Viewpoints for pictures of the belief: name, eye and target relative to the robot's base [m]."""
 SIDES_HFOV_DEG = 55.0
 """Horizontal field of view of these viewpoints [deg]."""
 CameraChoice: TypeAlias = int | str | CameraConfig | PinholeCamera | None
-"""A camera of the rig by its index or name, the name of a viewpoint, or a camera; None for the
-task's viewpoint."""
+"""Index or name of a camera of the rig, name of a viewpoint, or a camera; None for the task's
+viewpoint."""
 
 
 class Size(NamedTuple):
-    """Size of a picture [px]."""
+    """Size of a picture."""
 
     width: int
-    """Width."""
+    """Width of the picture [px]."""
     height: int
-    """Height."""
+    """Height of the picture [px]."""
 
 
 class Pose(NamedTuple):
-    """Pose of an environment."""
+    """Pose of the robot, the objects and the workers in an environment."""
 
     q: Floats
-    """(nq,) robot, fingers and loose objects, as `Physics.qpos`."""
+    """(nq,) generalized positions of the robot, fingers and loose objects, in the order of
+    `Physics.qpos`."""
     motion: WorkerMotion
     """Poses of the workers, arrays (W, S, ...)."""
 
 
 def check_size(width: object, height: object) -> Size:
-    """Return the size of a picture, or raise `ConfigError` unless it is from 16 to 4096 px."""
+    """Return the size of a picture; raise `ConfigError` unless both are from 16 to 4096 px."""
     limits = SMALLEST_PX, LARGEST_PX
-    return Size(whole("width [px]", width, *limits), whole("height [px]", height, *limits))
+    return Size(
+        check_integer("width [px]", width, *limits), check_integer("height [px]", height, *limits)
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """Copy of one environment's present moment, so that the simulation may advance."""
+    """A copy of an environment's present state, from which pictures can be rendered later."""
 
     q: Floats
-    """(nq,) robot, fingers and loose objects, as `Physics.qpos`."""
+    """(nq,) generalized positions of the robot, fingers and loose objects, in the order of
+    `Physics.qpos`."""
     motion: WorkerMotion
     """Poses of the workers, arrays (W, S, ...)."""
     look: Look | None
-    """Look of the episode; None for the scene as built."""
+    """Appearance of the episode; None for the scene as built."""
     markers_world: Points3
-    """(M, 3) markers of the task [m]."""
+    """(M, 3) positions of the task's markers [m]."""
     cameras: tuple[PinholeCamera, ...]
     """Cameras of the episode."""
     estimate: PoseEstimate
@@ -105,20 +109,21 @@ class Glance:
     keypoints: Keypoints | None
     """Last detections, a batch of one; None without cameras."""
     windows: list[list[Roi | None]]
-    """Crop of each worker in each camera's image."""
+    """Window of each worker's crop in each camera's image."""
     crops: list[Image | None]
-    """Crop of the first worker for the pose network, from each camera."""
+    """Crop of the first worker from each camera, the input of the pose network."""
     shield_rad_s: float = 0.0
     """Norm of the shield's change of the last command [rad/s]."""
     solids: tuple[Solids, ...] = ()
-    """Capsules from which distances are computed, for the overlay."""
+    """Capsules from which distances are computed, for the overlay "capsules"."""
 
 
 class Views:
-    """Pictures of a simulation's environments; graphics contexts are made at the first picture.
+    """Pictures of a simulation's environments.
 
-    Any thread may draw, and call `close`, but no two at once. With a `glance` that was taken
-    before, the simulation may advance in another thread.
+    Graphics contexts are made when the first picture is rendered. Any thread may render and call
+    `close`, but only one at a time. If a `glance` is taken first, the simulation may advance in
+    another thread.
 
     Args:
         simulation: the simulation.
@@ -127,7 +132,7 @@ class Views:
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
         self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
-        """Size of the pictures and renderer, by purpose."""
+        """Size of the pictures and the renderer, by purpose."""
 
     def picture(
         self,
@@ -142,15 +147,15 @@ class Views:
         """Return a picture of environment `b`, (height, width, 3) of uint8, top row first.
 
         Args:
-            depth: whether to return distances along the optical axis instead, (height, width)
-                float32 [m], of the scene alone.
-            b: the environment.
+            depth: whether to return distances along the optical axis instead, (height, width) of
+                float32 [m], of the scene without overlays.
+            b: index of the environment.
             size: width and height [px].
             camera: index or name of a camera of the rig, a viewpoint such as "room" or "top", or a
                 `CameraConfig`; None for the task's viewpoint.
-            markers: whether the markers of the task are shown, such as goals.
+            markers: whether the markers of the task, such as goals, are shown.
             capsules: whether the capsules of robot and people, from which distances are computed,
-                are drawn over the scene; not for a camera with a lens.
+                are drawn over the scene; not supported for cameras with a lens.
 
         Raises:
             ConfigError: there is no such camera.
@@ -171,7 +176,7 @@ class Views:
         return image
 
     def glance(self, b: int = 0, capsules: bool = False) -> Glance:
-        """Return a copy of environment `b`'s present moment; with `capsules`, also its solids."""
+        """Return a copy of environment `b`'s present state, with its solids if `capsules`."""
         simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
@@ -193,12 +198,12 @@ class Views:
         return Pose(self.simulation.physics.qpos[b], motion)
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
-        """Return the scene with the estimated skeletons over it.
+        """Return a picture of the scene, overlaid with the estimated skeletons.
 
         Args:
             width: width of the picture [px].
             height: height of the picture [px].
-            seen: a moment, as `glance` returns it.
+            seen: the state to show, as `glance` returns it.
 
         Returns:
             (height, width, 3) of uint8, top row first.
@@ -216,10 +221,10 @@ class Views:
         Args:
             width: width of a picture [px].
             height: height of a picture [px].
-            seen: a moment, as `glance` returns it.
+            seen: the state to show, as `glance` returns it.
 
         Returns:
-            (height, width, 3) of uint8 each, without shadows, as in the input of the detector.
+            Pictures (height, width, 3) of uint8, without shadows, like the detector's input.
         """
         views = self._through_cameras(width, height, seen, seen.cameras)
         for c, (camera, image) in enumerate(zip(seen.cameras, views, strict=True)):
@@ -233,7 +238,7 @@ class Views:
         return views
 
     def crops(self, size: int, seen: Glance) -> list[Image]:
-        """Return each camera's crop, the input of the pose network, with its landmarks."""
+        """Return the crop from each camera (the pose network's input), with detected landmarks."""
         keypoints, images = seen.keypoints, list[Image]()
         if keypoints is None or not seen.windows:
             return []
@@ -252,15 +257,15 @@ class Views:
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
         """Return pictures of the belief from above and from the side.
 
-        They show the robot, its task and the estimate of the workers, and no truth.
+        They show the robot, its task and the estimated workers, but not the true workers.
 
         Args:
             width: width of a picture [px].
             height: height of a picture [px].
-            seen: a moment, as `glance` returns it.
+            seen: the state to show, as `glance` returns it.
 
         Returns:
-            (height, width, 3) of uint8 each.
+            Pictures (height, width, 3) of uint8.
         """
         chain = self.simulation.chain
         arm = capsules(chain, seen.q[: chain.n_joints])
@@ -280,7 +285,7 @@ class Views:
         return images
 
     def mosaic(self, b: int = 0) -> Image:
-        """Return the cameras' pictures of environment `b`, tiled in two columns."""
+        """Return one picture with all cameras of environment `b`, tiled in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
@@ -293,13 +298,13 @@ class Views:
         return {**self.__dict__, "_renderers": {}}
 
     def _make_view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
-        """Return the camera of a picture of this size."""
+        """Return the chosen camera or viewpoint with a picture of this size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
         return resize(chosen, width, height)
 
     def _draw_marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
-        """Return a camera's picture with shadows, markers and capsules."""
+        """Render a camera's picture with shadows, markers and capsules."""
         (image,) = self._draw([camera], seen, shadows=True)
         stage: Stage = self._renderers["stage"][1]
         if seen.solids:
@@ -312,7 +317,7 @@ class Views:
     def _through_cameras(
         self, width: int, height: int, seen: Glance, cameras: Sequence[PinholeCamera]
     ) -> list[Image]:
-        """Return pictures of cameras with or without lenses, without shadows."""
+        """Render the pictures of cameras with or without lenses, without shadows."""
         if all(camera.lens is None for camera in cameras):
             return self._draw([resize(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
@@ -328,7 +333,7 @@ class Views:
     def _draw(
         self, cameras: list[PinholeCamera], seen: Glance, shadows: bool = False
     ) -> list[Image]:
-        """Return pictures of pinhole cameras at fixed viewpoints."""
+        """Render the pictures of pinhole cameras at fixed viewpoints."""
         largest = self._renderers["stage"][0] if "stage" in self._renderers else (0, 0)
         sizes = [largest, *((camera.width_px, camera.height_px) for camera in cameras)]
         width, height = np.max(sizes, axis=0).tolist()
@@ -336,12 +341,12 @@ class Views:
         return [stage.picture(camera, shadows) for camera in cameras]
 
     def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
-        """Return the posed renderer for a purpose; another size of pictures takes a new one.
+        """Return the posed renderer for a purpose, which is made anew if the picture size changes.
 
         Args:
             purpose: a key of `_MAKERS`.
             size: width and height of the pictures [px].
-            seen: the moment that is drawn.
+            seen: the state that is rendered.
         """
         had, renderer = self._renderers.get(purpose, (size, None))
         if renderer is None or had != size:
@@ -355,7 +360,7 @@ class Views:
 
 
 def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
-    """Return a camera of a rig, the name of a viewpoint, or a user's own camera.
+    """Return the chosen camera of a rig, name of a viewpoint, or custom camera.
 
     Raises:
         ConfigError: there is no such camera.
@@ -367,9 +372,9 @@ def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | Pin
         return make_cameras([choice])[0]
     if isinstance(choice, str):
         if choice not in rig and choice not in VIEWPOINTS:
-            raise unknown("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
+            raise make_unknown_name_error("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
         return rig.get(choice, choice)
-    return cameras[whole(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
+    return cameras[check_integer(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
 
 
 _MAKERS: dict[str, Callable[..., Canvas]] = {

@@ -1,1 +1,1 @@
-"""What keeps a robot from harm between its agent and its joints."""
+"""Shields, constraints, costs and incidents: the safety of people near the robot."""

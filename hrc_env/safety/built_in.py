@@ -1,17 +1,17 @@
 """The built-in shields: joint velocities that keep every constraint of `safety.constraints`.
 
 "ssm" scales all joint velocities by one factor, which keeps the path. "qp" and "pfl" take the
-nearest velocities that the arm can reach in a step. A constraint that demands a retreat counts as
-two: one not to approach, with a weight that outweighs nearly everything, and one to retreat: with
-a single constraint, an arm that flees from a hand pushes its wrist into the other hand.
+nearest velocities that the arm can reach in a step. A constraint that demands a retreat is split
+into two: one not to approach, with a very large weight, and one to retreat. With a single
+constraint, an arm that retreats from one hand would push its wrist into the other hand.
 
 A task may allow parts of estimated bodies to touch the robot's hand (`Task.allowed_contact`), such
 as the forearms and hands of a worker who takes a tool. While these approach no faster than their
 region of the body tolerates in a contact with this arm and its load
-(`contact.permitted_contact_speed`), no link retreats from them, so that the held object stays in
-reach. The last link and its load may touch them: at `contact_speed_m_s` at most, and with a sum of
-both speeds that the region tolerates. Nothing changes for other people, for other parts of their
-bodies, and for the approach of other links, except that these may approach at `creep_m_s`.
+(`contact.permitted_contact_speed`), no link retreats from them, which keeps the held object in
+reach. The last link and its load may touch them at `contact_speed_m_s` at most, if the region
+tolerates the sum of both speeds. Nothing changes for other people, for other parts of their bodies,
+and for the approach of other links, except that these links may approach at `creep_m_s`.
 """
 
 import math
@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import needed
+from hrc_env.core.errors import require
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
 from hrc_env.core.vacancy import WALKING_M_S
@@ -46,30 +46,30 @@ from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
 NO_APPROACH_WEIGHT, RETREAT_WEIGHT = 1e4, 30.0
-"""Weights of a constraint's violation [m/s], against changes of joint velocities [rad/s]."""
+"""Weights of constraint violations [m/s] relative to changes of joint velocities [rad/s]."""
 TOLERANCE_M_S = 1e-6
-"""Violation below which a constraint counts as kept [m/s]."""
+"""Violation below which a constraint counts as satisfied [m/s]."""
 
 
 class ShieldOutput(NamedTuple):
     """The result of a shield."""
 
     velocities: JointVelocities
-    """(B, N) the joint velocities that the arm receives [rad/s]."""
+    """Joint velocities that the arm receives (B, N) [rad/s]."""
     values: Mapping[str, Floats]
-    """(B,) by name; each becomes "shield/NAME" in info."""
+    """Reported values (B,) by name; each becomes "shield/NAME" in info."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmPose:
-    """Where the links and capsules are of the robots that a shield commands."""
+    """Poses of the links and capsules of the robots that a shield commands."""
 
     model: RobotModel
-    """The robot's constants."""
+    """Constants of the robot."""
     frames: Transforms
-    """(B, N, 4, 4) world_from_link of every joint's link."""
+    """Frame of every joint's link (B, N, 4, 4), world_from_link."""
     links: Ints
-    """(K,) index of the link that carries each capsule."""
+    """Index of the link that carries each capsule (K,)."""
 
 
 def limit_command(
@@ -77,11 +77,11 @@ def limit_command(
 ) -> ShieldOutput:
     """Return the nearest safe joint velocities, as a `shield.Shield` with these settings.
 
-    Its values by name are
+    The reported values are
 
-    - "clearance_m" (B,): the least clearance D of the pairs that matter [m], NaN without any;
-    - "slack" (B,): the greatest violation of a constraint, retreats included [m/s];
-    - "unknown" (B,): 1 while it is not known where a worker is, or the last detection is stale.
+    - "clearance_m" (B,): the smallest clearance D of the relevant pairs [m], NaN if there are none;
+    - "slack" (B,): the greatest violation of a constraint, including retreats [m/s];
+    - "unknown" (B,): 1 while a worker's position is unknown or the last detection is too old.
 
     Args:
         belief: the robot's knowledge of itself and of the workers.
@@ -110,8 +110,8 @@ def limit_command(
 
 
 def describe_pose(belief: Belief) -> ArmPose:
-    """Return where links and capsules are; the last link carries the loads."""
-    model = needed(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
+    """Return the poses of links and capsules; loads are attached to the last link."""
+    model = require(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
     n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
     links = np.append(model.chain.capsule_link, carried)
@@ -128,13 +128,13 @@ def build_constraints(
 ) -> Constraints:
     """Return the tightest constraints of every robot.
 
-    For "ssm" only velocities between rest and `wanted` are within reach, for other kinds those that
-    the slew reaches until the next command.
+    For "ssm", only velocities between rest and `wanted` are within reach; for other kinds, those
+    that the slew rate permits until the next command.
 
     Args:
         belief: the robot's knowledge of itself and of the workers.
-        pose: its links.
-        is_lost: (B, W) the workers that were detected once, but not lately.
+        pose: poses of the robots' links and capsules.
+        is_lost: (B, W) mask of the workers that were detected once, but not recently.
         wanted: (B, N) joint velocities of the agent [rad/s].
         dt_s: time until the next command [s].
         config: kind, margins and limits.
@@ -142,7 +142,7 @@ def build_constraints(
     model, batch = pose.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
     if config.kind != "ssm":
-        in_force = needed(belief.command, "The command in force, which a built-in shield needs,")
+        in_force = require(belief.command, "The command in force, which a built-in shield needs,")
         most, change = model.fastest_rad_s, model.slew_rad_s2 * dt_s
         low = np.minimum(np.maximum(-most, in_force - change), most)
         high = np.maximum(np.minimum(most, in_force + change), -most)
@@ -176,7 +176,7 @@ def build_constraints(
 def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
     """Return the estimated bodies.
 
-    Lost workers (B, W) are at rest at their last estimate.
+    Lost workers (B, W) are assumed to be at rest at their last estimate.
     """
     estimate = belief.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
@@ -203,16 +203,17 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
 
 @dataclass(frozen=True, slots=True)
 class AllowedTouches:
-    """How fast touches of estimated bodies may be."""
+    """Speed limits of the allowed touches of estimated bodies."""
 
     segment_m_s: Floats
-    """(B, W, S) greatest relative speed of an allowed touch of each segment [m/s]; 0: none is."""
+    """Greatest relative speed of an allowed touch of each segment (B, W, S) [m/s]; 0 if none is
+    allowed."""
     capsule_m_s: Floats
-    """(K,) greatest speed of each of the robot's capsules in an allowed touch [m/s]."""
+    """Greatest speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
 
 
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the touches that are allowed: by "pfl" everywhere, by others as the task permits."""
+    """Return the allowed touches: all of them for "pfl", otherwise those that the task permits."""
     model, links = pose.model, pose.links
     shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":
@@ -237,9 +238,9 @@ def scale_velocities(
     """Scale the velocities of all joints by one factor until every constraint holds.
 
     Args:
-        constraints: of every robot.
+        constraints: constraints of every robot.
         wanted: (B, N) joint velocities of the agent [rad/s].
-        allowed: (B, N) written: those that are allowed [rad/s].
+        allowed: (B, N) receives the allowed joint velocities [rad/s].
     """
     J, b = constraints.J, constraints.b
     for e in range(len(wanted)):
@@ -258,12 +259,12 @@ def find_nearest_velocities(
 ) -> None:
     """Find the nearest joint velocities within reach that keep the constraints.
 
-    Where the wanted ones keep all constraints, these are allowed, within reach or not.
+    If the wanted velocities keep all constraints, they are allowed, within reach or not.
 
     Args:
-        constraints: of every robot.
+        constraints: constraints of every robot.
         wanted: (B, N) joint velocities of the agent [rad/s].
-        allowed: (B, N) written: those that are allowed [rad/s].
+        allowed: (B, N) receives the allowed joint velocities [rad/s].
     """
     J, b, count = constraints.J, constraints.b, constraints.n_rows
     low, high = constraints.low, constraints.high
@@ -305,10 +306,10 @@ def limit_speed(
 
     Args:
         frames: (B, N, 4, 4) world_from_link.
-        slides: (N,) which joints are slides.
+        slides: (N,) mask of the joints that are slides.
         links: (K,) index of the link that carries each capsule.
         capsules: (B, K, 2, 3) end points in the world [m].
-        limit_m_s: (B,) speed limit of every point [m/s]; infinite: none.
+        limit_m_s: (B,) speed limit of every point [m/s]; infinite for none.
         allowed: (B, N) joint velocities, changed in place [rad/s].
     """
     for e in range(len(allowed)):
@@ -330,7 +331,7 @@ def limit_speed(
 
 @kernel
 def find_slack(constraints: Constraints, allowed: JointVelocities, slack: Floats) -> None:
-    """Write the greatest violation of a constraint, (B,) [m/s], of velocities (B, N) [rad/s]."""
+    """Write the greatest constraint violation of the `allowed` velocities to `slack` (B,) [m/s]."""
     for e in range(len(allowed)):
         slack[e] = 0.0
         for r in range(constraints.n_rows[e]):

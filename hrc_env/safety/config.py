@@ -18,40 +18,43 @@ MARGINS = ("margin_m", "hand_margin_m")
 IS_FOREARM_OR_HAND: Bools = np.array(
     [False] * 6 + [True] * 2 + [False] * (len(SEGMENT_ENDS) - 8) + [True] * len(HAND_SEGMENTS)
 )
-"""(S,) the segments to which `ShieldConfig.hand_margin_m` applies."""
+"""Mask of the segments to which `ShieldConfig.hand_margin_m` applies (S,)."""
 
 
 class ShieldParams(NamedTuple):
-    """The numbers of a `ShieldConfig` as its kernels read them; names are those of its fields."""
+    """Numbers of a `ShieldConfig` in the form that kernels read."""
 
     margins_m: Floats
-    """(S,) `margin_m` or `hand_margin_m` of each segment of a body [m]."""
+    """`margin_m` or `hand_margin_m` of each segment of a body (S,) [m]."""
     n_sigmas: float
-    """Z_d in standard deviations."""
+    """Uncertainty margin Z_d in standard deviations."""
     min_uncertainty_m: float
-    """Lower bound on Z_d [m]."""
+    """Lower bound on the uncertainty margin Z_d [m]."""
     prediction_growth_m_s: float
-    """Share of the deviation that comes from prediction, per second without a detection [m/s]."""
+    """Share of the standard deviation that comes from prediction, per second without a detection
+    [m/s]."""
     single_view_std_m: float
-    """Standard deviation above which a single camera locates a part of the body [m]."""
+    """Standard deviation above which a part of the body is assumed to be located by a single camera
+    [m]."""
     single_view_sigmas: float
-    """Additional factor on the deviation above that."""
+    """Additional factor on the standard deviation above `single_view_std_m`."""
     follows_estimate: bool
-    """Whether `worker_m_s` is added to the estimated speed of the worker, or replaces it."""
+    """Whether `worker_m_s` is added to the estimated speed of the worker instead of replacing
+    it."""
     worker_m_s: float
-    """Speed of the worker towards the robot, or what is added to the estimated one [m/s]."""
+    """Speed of the worker towards the robot, or the amount added to the estimated speed [m/s]."""
     travel_s: float
-    """Time for which the worker comes on [s]."""
+    """Time for which the worker is assumed to keep approaching [s]."""
     reaction_s: float
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float
     """Greatest deceleration of a point of the robot [m/s^2]."""
     gain_hz: float
-    """Speed of a retreat by depth of the violation [1/s]."""
+    """Speed of a retreat divided by the depth of the violation [1/s]."""
     retreat_m_s: float
     """Upper bound on the speed of a retreat [m/s]."""
     creep_m_s: float
-    """Speed of corrections next to segments that may be touched [m/s]."""
+    """Speed of small corrections near segments that may be touched [m/s]."""
 
 
 @answer_unknown_fields
@@ -73,16 +76,16 @@ class ShieldConfig:
         "unseen_s": "stale_after_s", "unknown_m_s": "unknown_speed_limit_m_s",
         "welcome_m_s": "contact_speed_m_s", "still_m_s": "creep_m_s",
     }  # fmt: skip
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their old names."""
 
     kind: str = "qp"
     """Method: "qp" takes the nearest joint velocities that keep all constraints; "ssm" scales all
-    joint velocities by one factor; "pfl" is "qp" that allows touches as slow as the touched region
-    of the body bears."""
+    joint velocities by one factor; "pfl" is "qp" that also allows touches, up to the speed that the
+    touched region of the body tolerates."""
     margin_m: float = 0.05
     """Distance subtracted from every gap, since bodies are not capsules [m]. With a negative value
-    the shield allows less distance than the estimate requires, as `experiment price` does to find
-    an equal rate of contacts."""
+    the shield permits less distance than the estimate requires, which `experiment price` uses to
+    find an equal rate of contacts."""
     hand_margin_m: float = 0.13
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
     nearly all contacts [m]."""
@@ -93,47 +96,47 @@ class ShieldConfig:
     """Lower bound on the uncertainty margin Z_d [m]."""
     prediction_growth_m_s: float = 0.7
     """Share of the standard deviation that comes from prediction, per second since a part of the
-    body was last detected [m/s]. It counts once instead of `n_sigmas` times: late images that carry
-    their time are predicted with regions that are too wide."""
+    body was last detected [m/s]. It counts once instead of `n_sigmas` times, because the predicted
+    uncertainty of late images that carry their time is too large."""
     single_view_std_m: float = 0.08
-    """Standard deviation above which a part of the body is taken to be located by a single camera,
-    whose errors exceed the reported ones [m]."""
+    """Standard deviation above which a part of the body is assumed to be located by a single
+    camera, whose errors exceed the reported ones [m]."""
     single_view_sigmas: float = 5.0
     """Additional factor on the standard deviation above `single_view_std_m`."""
     worker_speed_m_s: float | None = None
-    """Speed of a worker towards the robot, 1.6 in ISO 13855; None: the estimated speed plus
-    `worker_speed_margin_m_s` [m/s]."""
+    """Speed of a worker towards the robot, 1.6 in ISO 13855 [m/s]; None for the estimated speed
+    plus `worker_speed_margin_m_s`."""
     worker_speed_margin_m_s: float = 0.2
-    """How much faster than estimated a worker may be [m/s]."""
+    """Amount by which a worker may be faster than estimated [m/s]."""
     worker_time_s: float = 0.2
-    """Time for which a worker is assumed to come on at that speed [s]."""
+    """Time for which a worker is assumed to keep approaching at that speed [s]."""
     latency_s: float = 0.0
     """Additional age of the estimate, for late images that do not carry their time [s]."""
     reaction_s: float = 0.08
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float = 3.0
-    """Greatest deceleration of a point of the robot, where its joints can achieve it [m/s^2]."""
+    """Greatest deceleration of a point of the robot, if its joints can achieve it [m/s^2]."""
     retreat_gain_hz: float = 4.0
     """Speed of a retreat divided by the amount by which the clearance is negative [1/s]."""
     max_retreat_m_s: float = 1.0
-    """Upper bound on the speed of a retreat; 0: the robot only stops approaching, as "ssm" always
-    does [m/s]."""
+    """Upper bound on the speed of a retreat [m/s]; with 0 the robot only stops approaching, as
+    "ssm" always does."""
     stale_after_s: float = 0.25
-    """Time since the last detection after which a worker counts as lost, and may be as far from the
-    last detected place as walking allows, at `worker_speed_m_s` (None: 1.6 m/s) [s]. Within that
-    distance the robot does not approach the place. Lost workers are unknown, like those without a
-    track; images that are later than this make robots slow."""
+    """Time since the last detection after which a worker counts as lost [s]. A lost worker may have
+    walked at `worker_speed_m_s` (None: 1.6 m/s) from the last detected position, which the robot
+    does not approach within that distance. Lost workers are unknown, like those without a track;
+    images that are later than this time slow the robot down."""
     unknown_speed_limit_m_s: float = 0.25
     """Speed limit of every point of the robot while a worker is lost, and near floor that only one
-    camera has seen empty [m/s]. It falls from 1 m to 0.25 m before the lost worker's last place, to
-    zero. Before the first image the robot stands. 0: it stops."""
+    camera has seen empty [m/s]; 0 stops the robot. Between 1 m and 0.25 m from the lost worker's
+    last position the limit decreases to zero. Before the first image the robot stands still."""
     contact_speed_m_s: float = 0.25
     """Greatest speed of the robot's hand and its load towards segments that a task allows to touch
-    them, as in a handover (`Task.allowed_contact`), and no faster than the region of the body
-    bears; 0: no touch is allowed [m/s]."""
+    them, as in a handover (`Task.allowed_contact`), but no faster than the region of the body
+    tolerates [m/s]; 0 forbids touches."""
     creep_m_s: float = 0.02
-    """Speed at which other links may approach these segments where the clearance allows less: small
-    corrections hold in place what is handed over [m/s]."""
+    """Speed at which other links may approach these segments if the clearance permits less [m/s];
+    small corrections keep an object in place while it is handed over."""
 
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
@@ -171,4 +174,4 @@ PRESETS = {
     "qp": ShieldConfig("qp"),
     "pfl": ShieldConfig("pfl", max_retreat_m_s=0.0),
 }
-"""The built-in shields, by the names that `shield=` takes."""
+"""The built-in shields, by the names that `shield=` accepts."""

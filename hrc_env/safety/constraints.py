@@ -8,20 +8,20 @@ the robot's nearest point to the body's, and the clearance is
 with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
 of predicted^2 + seen^2. From `ShieldConfig` come k `n_sigmas`, k' `single_view_sigmas`, s'
 `single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is `margin_m` or
-`hand_margin_m`. Where a body was not detected for a while, as in late images, much of the deviation
-comes from prediction, which is wide; a deviation that is large all the same belongs to a part that
-a single camera locates, whose errors exceed the reported ones. Where D >= 0 the robot may approach
-as fast as it can brake within D (the robot's share of `separation.protective_distance`); where
-D < 0 it has to retreat. Constraints that no command within reach violates are left out.
+`hand_margin_m`. If a body was not detected for a while, as with late images, most of the deviation
+comes from prediction, which overestimates it; a larger deviation belongs to a part that a single
+camera locates, whose errors exceed the reported ones. Where D >= 0 the robot may approach as fast
+as it can brake within D (the robot's share of `separation.protective_distance`); where D < 0 it has
+to retreat. Constraints that no command within reach violates are left out.
 
-A segment that may be touched causes no retreat while it comes no faster than its region of the body
-bears in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed that both
-together keep below that limit; points of other capsules may approach at `creep_m_s` where D allows
-less.
+A segment that may be touched causes no retreat while it approaches no faster than its region of the
+body tolerates in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed
+whose sum with the segment's is below that limit; points of other capsules may approach at
+`creep_m_s` if D permits less.
 
-A worker without a recent detection may be anywhere within a walk of the last detected place. That
-distance is subtracted from D, too, and within D the robot neither approaches nor flees. The same
-holds for people on floor that no camera has seen empty.
+A worker without a recent detection may be anywhere within walking distance of the last detected
+position. That distance is subtracted from D, too, and where D < 0 the robot neither approaches nor
+retreats. The same holds for people on floor that no camera has seen empty.
 """
 
 import math
@@ -49,132 +49,134 @@ from hrc_env.geometry.distances import closest_parameters
 from hrc_env.safety.config import ShieldParams
 
 MAX_CONSTRAINTS = 32
-"""Number of constraints of one robot; of more, the tightest are kept."""
+"""Maximum number of constraints of one robot; if there are more, the tightest are kept."""
 ABSENT_M = 1e3
-"""Coordinate beyond which a capsule belongs to a load that is not carried [m]."""
+"""Coordinate beyond which a capsule belongs to an absent load [m]."""
 RANKING_HZ = 1e-4
-"""Gain on D of the retreat from places where a lost worker may be [1/s]: hardly any motion, but it
-makes the nearest pairs the tightest constraints."""
+"""Gain of the retreat from positions where a lost worker may be, on D [1/s]; it causes hardly any
+motion, but makes the nearest pairs the tightest constraints."""
 MIN_FOREARM_M = 0.1
-"""Lower bound on an estimated forearm's length, on which the speed of its fingertips depends
-[m]."""
+"""Lower bound on an estimated forearm's length, which affects the speed of its fingertips [m]."""
 _N_LIMBS = len(SEGMENT_ENDS)
 _JOINTS: Ints = np.array(
     [[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS]
     + [[(wrist, wrist)] * 2 for _, wrist, *_ in HAND_SEGMENTS]
 )
-"""(S, 2, 2) the two joints whose mean is each end of a segment; both ends of a hand: its wrist."""
+"""The two joints whose mean is each end of a segment (S, 2, 2); both ends of a hand are its
+wrist."""
 
 
 class Robots(NamedTuple):
-    """The robots that a shield commands, one row an environment."""
+    """The robots that a shield commands, one row per environment."""
 
     frames: Transforms
-    """(B, N, 4, 4) world_from_link of every joint's link."""
+    """Frame of every joint's link (B, N, 4, 4), world_from_link."""
     slides: Bools
-    """(N,) which joints are slides."""
+    """Whether each joint is a slide (N,)."""
     links: Ints
-    """(K,) index of the link that carries each capsule."""
+    """Index of the link that carries each capsule (K,)."""
     capsules: Capsules
-    """(B, K, 2, 3) end points in the world [m]."""
+    """End points of the capsules in the world frame (B, K, 2, 3) [m]."""
     radii_m: Floats
-    """(K,) radius of each capsule [m]."""
+    """Radius of each capsule (K,) [m]."""
     low: JointVelocities
-    """(B, N) least joint velocities within reach [rad/s]."""
+    """Least joint velocities within reach (B, N) [rad/s]."""
     high: JointVelocities
-    """(B, N) greatest joint velocities within reach [rad/s]."""
+    """Greatest joint velocities within reach (B, N) [rad/s]."""
     slew: Floats
-    """(N,) greatest change of each joint velocity [rad/s^2]."""
+    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Bodies(NamedTuple):
-    """The estimated bodies of the workers, one row an environment and a worker."""
+    """The estimated bodies of the workers, one row per environment and worker."""
 
     segments: Capsules
-    """(B, W, S, 2, 3) end points of the segments in the world [m]."""
+    """End points of the segments in the world frame (B, W, S, 2, 3) [m]."""
     mean: Points3
-    """(B, W, J, 3) estimated joints [m]."""
+    """Estimated positions of the joints (B, W, J, 3) [m]."""
     velocity: Velocities3
-    """(B, W, J, 3) their estimated velocities [m/s]."""
+    """Estimated velocities of the joints (B, W, J, 3) [m/s]."""
     cov: Covariances3
-    """(B, W, J, 3, 3) covariance of each joint's position [m^2]."""
+    """Covariance of each joint's position (B, W, J, 3, 3) [m^2]."""
     age_s: Floats
-    """(B, W, J) time since a measurement last supported each joint [s]."""
+    """Time since each joint was last supported by a measurement (B, W, J) [s]."""
     is_located: Bools
-    """(B, W) whether the worker has a track, or is lost at a known place."""
+    """Whether the worker has a track, or is lost and its last position is known (B, W)."""
     moved_m: Floats
-    """(B, W) how far a lost worker may have walked since the last detection [m]; else 0."""
+    """Distance that a lost worker may have walked since the last detection (B, W) [m]; 0 for
+    others."""
     contact_m_s: Floats
-    """(B, W, S) greatest relative speed of an allowed touch of each segment [m/s]; 0: none is."""
+    """Greatest relative speed of an allowed touch of each segment (B, W, S) [m/s]; 0 if none is
+    allowed."""
     robot_share_m_s: Floats
-    """(K,) greatest speed of each capsule in an allowed touch [m/s]."""
+    """Greatest speed of each capsule of the robot in an allowed touch (K,) [m/s]."""
 
 
 class UnseenFloors(NamedTuple):
-    """The floor on which people may be that no camera has detected."""
+    """Floor on which people may be that no camera has detected."""
 
     centres_world: Points3
-    """(N, 3) centres of the pieces of floor [m]."""
+    """Centres of the patches of floor (N, 3) [m]."""
     level: Ints
-    """(B, N) the state of each piece: `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    """State of each patch (B, N): `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
     reach_m: Floats
-    """(B,) distance from a centre within which hands may be [m]."""
+    """Distance from a centre within which hands may be (B,) [m]."""
 
 
 class Constraints(NamedTuple):
     """The constraints J qd <= b on joint velocities, and the box low <= qd <= high."""
 
     J: Floats
-    """(B, M, N) rows n.J, of which the first `n_rows` count [m/rad, of slides 1]."""
+    """Rows n.J, of which the first `n_rows` are used (B, M, N) [m/rad, for slides 1]."""
     b: Floats
-    """(B, M) greatest speed of approach [m/s]; negative: the least speed of retreat."""
+    """Greatest speed of approach (B, M) [m/s]; if negative, the least speed of retreat."""
     n_rows: Ints
-    """(B,) number of constraints."""
+    """Number of constraints of each robot (B,)."""
     low: JointVelocities
-    """(B, N) least joint velocities within reach [rad/s]."""
+    """Least joint velocities within reach (B, N) [rad/s]."""
     high: JointVelocities
-    """(B, N) greatest joint velocities within reach [rad/s]."""
+    """Greatest joint velocities within reach (B, N) [rad/s]."""
     clearance_m: Floats
-    """(B,) least clearance D over the pairs that may matter [m]; infinite without any."""
+    """Smallest clearance D of the relevant pairs (B,) [m]; infinite if there are none."""
 
 
 class Arm(NamedTuple):
-    """One robot of `Robots`; the fields are those of a row."""
+    """One robot of `Robots`; the fields are those of one row."""
 
     frames: Transforms
-    """(N, 4, 4) world_from_link."""
+    """Frame of every joint's link (N, 4, 4), world_from_link."""
     slides: Bools
-    """(N,) which joints are slides."""
+    """Whether each joint is a slide (N,)."""
     low: JointVelocities
-    """(N,) least joint velocities within reach [rad/s]."""
+    """Least joint velocities within reach (N,) [rad/s]."""
     high: JointVelocities
-    """(N,) greatest joint velocities within reach [rad/s]."""
+    """Greatest joint velocities within reach (N,) [rad/s]."""
     slew: Floats
-    """(N,) greatest change of each joint velocity [rad/s^2]."""
+    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Body(NamedTuple):
     """One estimated body of `Bodies`."""
 
     mean: Points3
-    """(J, 3) estimated joints [m]."""
+    """Estimated positions of the joints (J, 3) [m]."""
     velocity: Velocities3
-    """(J, 3) their estimated velocities [m/s]."""
+    """Estimated velocities of the joints (J, 3) [m/s]."""
     cov: Covariances3
-    """(J, 3, 3) covariance of each joint's position [m^2]."""
+    """Covariance of each joint's position (J, 3, 3) [m^2]."""
 
 
 class Nearest(NamedTuple):
     """The nearest points of a robot's capsule and a body's segment."""
 
     distance_m: float
-    """Distance of the two axes [m]."""
+    """Distance between the two axes [m]."""
     along: float
-    """Place of the point on the segment, from 0 at its first end to 1 at its second."""
+    """Position of the point along the segment, from 0 at its first end to 1 at its second."""
 
 
 class Approach(NamedTuple):
-    """How a point of a body moves towards a robot, and how well it is known."""
+    """Motion of a point of a body towards a robot, and its uncertainty."""
 
     speed_m_s: float
     """Speed along -n [m/s]."""
@@ -188,7 +190,7 @@ class Reach(NamedTuple):
     max_speed_m_s: float
     """Greatest speed of approach within reach [m/s]."""
     deceleration_m_s2: float
-    """How fast the joints can reduce it [m/s^2]."""
+    """Deceleration that the joints can achieve along n [m/s^2]."""
 
 
 @kernel(makes_arrays=True)
@@ -198,10 +200,10 @@ def add_worker_constraints(
     """Write the tightest constraints of every robot against every located worker.
 
     Args:
-        robots: link frames, capsules and the velocities within reach.
+        robots: link frames, capsules and velocities within reach.
         bodies: estimated segments with velocities, covariances and ages.
         params: margins, limits and gains of the shield.
-        out: written: `J`, `b`, `n_rows` and `clearance_m`; the box is left as it was.
+        out: receives `J`, `b`, `n_rows` and `clearance_m`; the box is left unchanged.
     """
     n_caps, n_segments = robots.capsules.shape[1], bodies.segments.shape[2]
     rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
@@ -249,13 +251,13 @@ def add_worker_constraints(
 def add_floor_constraints(
     robots: Robots, floor: UnseenFloors, params: ShieldParams, out: Constraints
 ) -> None:
-    """Add constraints by which robots can brake before people on floor that was not seen empty.
+    """Add constraints that let robots brake before people on floor that was not seen empty.
 
     Args:
-        robots: link frames, capsules and the velocities within reach.
-        floor: the pieces of floor and their states.
+        robots: link frames, capsules and velocities within reach.
+        floor: patches of floor and their states.
         params: margins, limits and gains of the shield.
-        out: the constraints so far, to which these are added.
+        out: constraints so far, to which these are added.
     """
     body, rod, limb = np.empty((2, 3)), np.empty(5), np.empty(5)
     normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
@@ -285,12 +287,12 @@ def add_floor_constraints(
 
 @kernel
 def bound_capsule(ends: Floats, radius_m: float, sphere: Floats) -> None:
-    """Write the sphere around a capsule.
+    """Write the bounding sphere of a capsule to `sphere`.
 
     Args:
-        ends: (2, 3) its end points [m].
-        radius_m: its radius [m].
-        sphere: (5,) written: the centre and the radius [m]; the last value is left as it was.
+        ends: (2, 3) end points of the capsule [m].
+        radius_m: radius of the capsule [m].
+        sphere: (5,) receives the centre and the radius [m]; its last value is left unchanged.
     """
     squared = 0.0
     for i in range(3):
@@ -301,7 +303,7 @@ def bound_capsule(ends: Floats, radius_m: float, sphere: Floats) -> None:
 
 @kernel
 def sphere_gap(one: Floats, other: Floats) -> float:
-    """Return the distance between the surfaces of two spheres, as `bound_capsule` writes them."""
+    """Return the distance between the surfaces of two spheres [m], given as by `bound_capsule`."""
     dx, dy, dz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz) - one[3] - other[3]
 
@@ -310,14 +312,14 @@ def sphere_gap(one: Floats, other: Floats) -> float:
 def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldParams) -> float:
     """Return an upper bound on the distance in which a capsule can be brought to rest [m].
 
-    A pair with a greater clearance cannot matter. No point of a capsule is faster than its faster
+    A pair with a greater clearance is irrelevant. No point of a capsule is faster than its faster
     end. The bound of an absent load is -inf.
 
     Args:
         arm: the robot.
         link: index of the link that carries the capsule.
         ends: (2, 3) the capsule's end points [m].
-        params: the reaction time and the deceleration.
+        params: reaction time and deceleration.
     """
     fastest, longest_s = 0.0, 0.0
     for end in range(2):
@@ -338,9 +340,9 @@ def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldPara
 
 @kernel
 def bound_deduction(body: Body, s: int, params: ShieldParams) -> float:
-    """Return an upper bound on the difference of gap and clearance of segment `s` [m].
+    """Return an upper bound on the difference between gap and clearance of segment `s` [m].
 
-    It holds for every direction of n.
+    It is valid for every direction of n.
     """
     squared, variance = 0.0, 0.0
     for end in range(2):
@@ -361,7 +363,7 @@ def find_uncertainty(std_m: float, age_s: float, params: ShieldParams) -> float:
     Args:
         std_m: standard deviation of the position along n [m].
         age_s: time since the part of the body was last detected [s].
-        params: the factors on both shares of the deviation.
+        params: factors on both shares of the deviation.
     """
     predicted = min(std_m, params.prediction_growth_m_s * age_s)
     seen = math.sqrt(std_m * std_m - predicted * predicted)
@@ -371,11 +373,12 @@ def find_uncertainty(std_m: float, age_s: float, params: ShieldParams) -> float:
 
 @kernel
 def find_travel(speed_m_s: float, params: ShieldParams) -> float:
-    """Return how far a worker may come before the robot has stopped [m].
+    """Return the distance that a worker may approach before the robot has stopped [m].
 
     Args:
         speed_m_s: estimated speed towards the robot [m/s].
-        params: the worker's time, and the speed that replaces or enlarges the estimated one.
+        params: time of the worker's approach, and the speed that replaces or increases the
+            estimated one.
     """
     if params.follows_estimate:
         speed_m_s = max(speed_m_s, 0.0) + params.worker_m_s
@@ -388,7 +391,7 @@ def find_travel(speed_m_s: float, params: ShieldParams) -> float:
 def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
     """Return the velocity of an end of segment `s` [m/s].
 
-    The tip of a hand turns with its forearm.
+    The tip of a hand rotates with its forearm.
     """
     one, two = body.velocity[_JOINTS[s, end, 0]], body.velocity[_JOINTS[s, end, 1]]
     x, y, z = 0.5 * (one[0] + two[0]), 0.5 * (one[1] + two[1]), 0.5 * (one[2] + two[2])
@@ -404,7 +407,7 @@ def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
 
 @kernel
 def find_segment_age(age_s: Floats, s: int) -> float:
-    """Return the time since any joint of segment `s` was detected [s], of ages (J,)."""
+    """Return the time since any joint of segment `s` was detected [s], from all ages (J,)."""
     least = np.inf
     for end in range(2):
         for k in range(2):
@@ -420,8 +423,8 @@ def find_nearest(capsule: Floats, segment: Floats, point: Floats, normal: Floats
     Args:
         capsule: (2, 3) end points [m].
         segment: (2, 3) end points [m].
-        point: (3,) written: the point on the robot's axis [m].
-        normal: (3,) written: n, the unit vector from there to the body.
+        point: (3,) receives the nearest point on the robot's axis [m].
+        normal: (3,) receives n, the unit vector from there to the body.
     """
     squared, u, t = closest_parameters(capsule[0], capsule[1], segment[0], segment[1])
     distance = math.sqrt(squared)
@@ -439,8 +442,8 @@ def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach
     Args:
         body: the estimated body.
         s: index of the segment.
-        along: place of the point, from 0 at the segment's first end to 1 at its second.
-        normal: (3,) n.
+        along: position of the point, from 0 at the segment's first end to 1 at its second.
+        normal: (3,) unit vector n.
     """
     nx, ny, nz = normal[0], normal[1], normal[2]
     speed, variance = 0.0, 0.0
@@ -458,14 +461,14 @@ def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach
 
 @kernel
 def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -> Reach:
-    """Write n.J of a point of a robot, and return the velocities along n within reach.
+    """Write n.J of a point of a robot to `row`, and return the velocities along n within reach.
 
     Args:
         arm: the robot.
         link: index of the link that carries the point.
-        point: (3,) the point in the world [m].
-        normal: (3,) n.
-        row: (N,) written: n.J.
+        point: (3,) the point in the world frame [m].
+        normal: (3,) unit vector n.
+        row: (N,) receives n.J.
     """
     fastest, slowing = 0.0, 0.0
     for i in range(len(row)):
@@ -482,14 +485,14 @@ def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -
 def bound_approach(
     clearance_m: float, braking_m_s2: float, is_lost: bool, params: ShieldParams
 ) -> float:
-    """Return the greatest speed of approach [m/s]; negative: the least speed of retreat.
+    """Return the greatest speed of approach [m/s]; a negative value is the least speed of retreat.
 
     Args:
-        clearance_m: D [m].
-        braking_m_s2: how fast the point can be slowed down [m/s^2].
-        is_lost: whether the worker's place is only known from an earlier detection; there is no
-            retreat from these.
-        params: the reaction time and the gain and limit of a retreat.
+        clearance_m: clearance D [m].
+        braking_m_s2: greatest deceleration of the point [m/s^2].
+        is_lost: whether the worker's position is only known from an earlier detection; the robot
+            does not retreat from such workers.
+        params: reaction time, and gain and limit of a retreat.
     """
     if clearance_m < 0.0:
         if is_lost:
@@ -508,10 +511,10 @@ def bound_touch(
 
     Args:
         near_m: gap - margin - Z_d [m].
-        touch_m_s: speed of the robot that is allowed in the touch [m/s]; 0: it only keeps its
-            place.
+        touch_m_s: allowed speed of the robot in the touch [m/s]; with 0 it only makes small
+            corrections.
         braking_m_s2: greatest deceleration of the point [m/s^2].
-        params: the reaction time, and the speed of corrections.
+        params: reaction time and speed of corrections.
     """
     if touch_m_s == 0.0:
         return params.creep_m_s
@@ -521,13 +524,13 @@ def bound_touch(
 
 @kernel
 def keep_tightest(row: Floats, bound: float, e: int, out: Constraints) -> None:
-    """Add a constraint to environment `e`; where all places are taken, instead of a looser one.
+    """Add a constraint to environment `e`; if all rows are used, replace a looser one.
 
     Args:
-        row: (N,) n.J.
+        row: (N,) row n.J.
         bound: greatest speed of approach [m/s].
         e: index of the environment.
-        out: the constraints so far.
+        out: constraints so far.
     """
     at = out.n_rows[e]
     if at == MAX_CONSTRAINTS:

@@ -1,11 +1,11 @@
-"""Power and force limiting: limits of contacts by the region of the body that is touched.
+"""Power and force limiting: contact limits for each region of the body.
 
-ISO/TS 15066:2016, Annex A, Tables A.2 and A.3 (now in ISO 10218-2:2025), as open literature has
-them. Verify against the standard before certification. Pressures, which depend on edges, are not
-modelled.
+The limits are those of ISO/TS 15066:2016, Annex A, Tables A.2 and A.3 (now in ISO 10218-2:2025), as
+cited in open literature. Verify against the standard before certification. Pressures, which depend
+on edges, are not modelled.
 
-Model (A.3.6): two masses and the region's spring, F = v sqrt(mu k), 1 / mu = 1 / m_H + 1 / m_R. Of
-a robot that is bolted down m_R = M / 2 + m_L: half of its moving parts, and its load.
+Model (A.3.6): two masses and the region's spring, F = v sqrt(mu k), 1 / mu = 1 / m_H + 1 / m_R. For
+a fixed-base robot, m_R = M / 2 + m_L: half the mass of its moving parts plus its load.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Floats
 
 
@@ -24,17 +24,17 @@ class BodyRegion:
     name: str
     """Name of the region."""
     quasi_static_n: float
-    """Greatest force with which it may be clamped [N]."""
+    """Greatest permitted clamping force [N]."""
     stiffness_n_m: float
     """Stiffness of the region's spring [N/m]."""
     mass_kg: float
     """Effective mass of the region [kg]."""
     is_touched: bool = True
-    """Whether a contact with it is permitted at all; of the head, none is."""
+    """Whether contact with the region is permitted; False for the head."""
 
     @property
     def transient_n(self) -> float:
-        """Greatest force of a transient contact [N]: twice the quasi-static one, or none."""
+        """Greatest force of a transient contact [N]: twice the quasi-static one; 0 for the head."""
         return 2.0 * self.quasi_static_n * self.is_touched
 
 
@@ -67,26 +67,26 @@ SEGMENT_REGIONS: tuple[str, ...] = (
     *4 * ("lower leg",),
     *2 * ("hand and fingers",),
 )
-"""Region of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`); where a segment
-has several, the one with the lowest limit."""
+"""Region of the body of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`); if a
+segment has several regions, the one with the lowest limit."""
 
 
 def find_region(name: str) -> BodyRegion:
     """Return a region of the body by its name, or raise `ConfigError`."""
     if name not in REGIONS:
-        raise unknown("region of the body", name, REGIONS)
+        raise make_unknown_name_error("region of the body", name, REGIONS)
     return REGIONS[name]
 
 
 def effective_mass(moving_kg: ArrayLike, load_kg: ArrayLike = 0.0) -> Floats:
-    """Return m_R of a robot that is bolted down [kg]: half of its moving parts, and its load.
+    """Return the effective mass m_R of a fixed-base robot [kg]: half its moving mass plus its load.
 
     Args:
         moving_kg: mass of the robot's moving parts [kg].
         load_kg: mass of its load [kg].
 
     Raises:
-        ConfigError: a mass that is negative, or no moving mass.
+        ConfigError: a mass is negative, or the moving mass is zero.
     """
     moving, load = np.asarray(moving_kg, float), np.asarray(load_kg, float)
     if not ((moving > 0.0).all() and (load >= 0.0).all()):
@@ -114,7 +114,7 @@ def contact_force(region: str, relative_m_s: ArrayLike, robot_kg: ArrayLike) -> 
 def permitted_contact_speed(region: str, robot_kg: ArrayLike) -> Floats:
     """Return the greatest relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
 
-    It is 0 where no contact is permitted.
+    It is 0 if no contact with the region is permitted.
 
     Args:
         region: name of the region of the body.
@@ -128,7 +128,7 @@ def permitted_contact_speed(region: str, robot_kg: ArrayLike) -> Floats:
 
 
 def _impedance(region: BodyRegion, robot_kg: ArrayLike) -> Floats:
-    """Return sqrt(mu k) [Ns/m]."""
+    """Return sqrt(mu k), the ratio of contact force to relative speed [Ns/m]."""
     mass_kg = np.asarray(robot_kg, float)
     if not (mass_kg > 0.0).all():
         raise ConfigError(f"robot_kg must be a positive mass [kg], got {robot_kg}.")

@@ -1,4 +1,4 @@
-"""Cost: the unsafe events of a step, counted on the true separations and incidents."""
+"""Cost of a step: its unsafe events, from the true separations and incidents."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,9 +18,10 @@ _BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
     ),
     "near_miss": lambda incidents: incidents["is_near_miss"].sum(1).astype(float),
 }
-"""Components of the cost (B,) by incidents (B, W): contacts that begin while the robot moves
-towards the worker; the force of contacts that begin, as a share of what the body bears; 1 while the
-robot moves towards a worker within the protective distance; near misses."""
+"""Components of the cost (B,) computed from incidents (B, W): number of contacts that begin while
+the robot moves towards the worker; sum of the forces of contacts that begin, relative to what the
+body tolerates; 1 if the robot moves towards a worker within the protective distance; number of near
+misses."""
 COMPONENTS = ("proximity", "contact", *_BY_INCIDENT)
 """Components that `CostConfig.components` may name."""
 FORMER_COMPONENT = "too_near"
@@ -29,12 +30,13 @@ FORMER_COMPONENT = "too_near"
 
 @dataclass(frozen=True, slots=True)
 class CostConfig:
-    """The events that count as unsafe, and whether a contact ends the episode."""
+    """Events that count as unsafe, and whether a contact ends the episode."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """Summands of the cost, some of `COMPONENTS`; the default ones sum to control steps."""
+    """Summands of the cost, chosen from `COMPONENTS`; the default cost is a number of control
+    steps."""
     proximity_m: float = 0.15
-    """True separation of the surfaces below which a step costs 1 [m]."""
+    """True separation between surfaces below which a step costs 1 [m]."""
     contact_terminates: bool = False
     """Whether a contact ends the episode."""
 
@@ -54,21 +56,21 @@ class CostConfig:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of one step by separations, per environment."""
+    """Cost of one step from separations, for each environment."""
 
     proximity: Floats
-    """(B,) 1 where surfaces came nearer than `CostConfig.proximity_m`, else 0 [control steps]."""
+    """1 if surfaces came nearer than `CostConfig.proximity_m`, otherwise 0 (B,) [control steps]."""
     contact: Floats
-    """(B,) 1 where surfaces touched, else 0 [control steps]."""
+    """1 if surfaces touched, otherwise 0 (B,) [control steps]."""
     min_separation_m: Floats
-    """(B,) smallest true separation of the step [m]; infinite without workers."""
+    """Smallest true separation in the step (B,) [m]; infinite without workers."""
 
 
 def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
-    """Return the cost of a step by the true separations (B, T, W) of its physics steps [m].
+    """Return the cost of a step from the true separations (B, T, W) of its physics steps [m].
 
-    Contacts are found by distance: a hand that follows a recording can pass through a thin arm
-    between two steps of the contact solver.
+    Contacts are detected by distance, because a hand that follows a recording can pass through a
+    thin arm between two steps of the contact solver.
     """
     nearest_m = gaps_m.min((1, 2), initial=np.inf)
     return Cost(
@@ -81,12 +83,12 @@ def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
 def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) -> dict[str, Floats]:
     """Return the components (B,) of a step's cost by name.
 
-    Proximity and contact are always among them.
+    Proximity and contact are always included.
 
     Args:
-        cost: the cost by separations.
-        incidents: (B, W) the incidents of the step.
-        config: the components that are chosen.
+        cost: cost from separations.
+        incidents: (B, W) incidents of the step.
+        config: selection of components.
     """
     components = {"proximity": cost.proximity, "contact": cost.contact}
     chosen = (name for name in config.components if name not in components)

@@ -1,13 +1,13 @@
 """Incidents: contacts by kind and force, near misses, violations of the protective distance.
 
-All of it is counted on the truth, from the bodies' places in the physics steps of a control step. A
-*directed speed* is the rate at which one body's motion narrowed the separation, with the other held
-where it is at the end. A contact begins when surfaces touch that have not touched for
-`CONTACT_GAP_S`, as an arm that was hit bounces. Its kind is the robot's motion in the control step
-before, since the impact changes the motion in the step itself: the robot moved *towards* the
-worker, it was *fleeing*, or it was *standing*. The closing speed is that speed plus the worker's,
-which no impact changes. The force of a contact follows ISO/TS 15066, A.3, as a share of what the
-touched region bears (`safety.contact`).
+All values are computed from the true poses of the bodies at the physics steps of a control step. A
+*directed speed* is the rate at which one body's motion reduced the separation, with the other body
+held at its final pose. A contact begins when surfaces touch that have not touched for
+`CONTACT_GAP_S`, because an arm that is hit bounces. Its kind is the robot's motion in the previous
+control step, because the impact changes the motion in the step itself: the robot moved *towards*
+the worker, it was *fleeing*, or it was *standing*. The closing speed is that speed plus the
+worker's speed, which no impact changes. The force of a contact follows ISO/TS 15066, A.3, relative
+to what the touched region tolerates (`safety.contact`).
 """
 
 from collections.abc import Sequence
@@ -29,20 +29,22 @@ from hrc_env.world import World
 
 KINDS = ("towards", "fleeing", "standing")
 MOVING_M_S = 0.05
-"""Directed speed above which a robot counts as moving towards a worker or fleeing [m/s]; a
-judgement. A robot that stands or flees cannot prevent that a worker walks into it."""
+"""Directed speed above which a robot counts as moving towards a worker or fleeing [m/s], chosen by
+judgement. A robot that stands or flees cannot prevent a worker from walking into it."""
 CONTACT_GAP_S = 0.5
-"""Time without touch after which another touch is another contact [s]."""
+"""Time without touch after which another touch counts as a new contact [s]."""
 WATCHED_M = 1.0
-"""Separation beyond which no speeds are measured [m]; bodies never close that much in a step."""
+"""Separation beyond which no speeds are measured [m]; in one step bodies never approach that
+much."""
 NEAR_MISS_M, CLEAR_M = 0.05, 0.10
-"""Separations at which a near miss begins, and beyond which it ends without a touch [m];
+"""Separations at which a near miss begins, and beyond which it ends without a touch [m], chosen by
 judgement."""
 REACTION_S = 0.1
-"""Reaction time in the protective distance [s]; a usual value."""
+"""Reaction time in the protective distance [s]; a typical value."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
 WITHIN, BEYOND, NEVER = 1, 2, 3
-"""Severities: within the limit of the region, beyond it, and the head, which must never be hit."""
+"""Severities: within the limit of the region, beyond it, and any contact with the head, which is
+never permitted."""
 _SIDED = {
     "shoulder": "back and shoulders",
     "upper_arm": "upper arm and elbow",
@@ -66,41 +68,41 @@ REGION_NAMES = tuple(REGIONS)
 
 
 class WorkerHistory:
-    """The history of one robot and worker in an episode."""
+    """History of one robot and worker in an episode."""
 
     robot_m_s: float
     """Directed speed of the robot in the last step [m/s]."""
     since_s: float
-    """Time since they touched last [s]."""
+    """Time since their last touch [s]."""
     is_close: bool
     """Whether they are as close as in a near miss."""
     contacts: Annotated[Ints, (len(KINDS),)]
-    """Contacts of each kind in this episode."""
+    """Number of contacts of each kind in this episode."""
     near_misses: int
-    """Near misses in this episode."""
+    """Number of near misses in this episode."""
 
 
 class Incident:
-    """The events between one robot and one worker in a step."""
+    """Events between one robot and one worker in a step."""
 
     separation_m: float
-    """Separation at the end of the step [m]; NaN beyond `WATCHED_M`, as the speeds."""
+    """Separation at the end of the step [m]; NaN beyond `WATCHED_M`, like the speeds."""
     robot_m_s: float
     """Directed speed of the robot [m/s]."""
     worker_m_s: float
     """Directed speed of the worker [m/s]."""
     kind: int
-    """Kind of a contact that begins, as an index into `KINDS`; -1: none begins."""
+    """Kind of a contact that begins, as an index into `KINDS`; -1 if none begins."""
     region: int
-    """Region of the body that is touched, as an index into `REGION_NAMES`; -1: none."""
+    """Region of the body that is touched, as an index into `REGION_NAMES`; -1 for none."""
     robot_speed_m_s: float
-    """Directed speed of the robot before a contact that begins [m/s]; NaN: none begins."""
+    """Directed speed of the robot before a contact that begins [m/s]; NaN if none begins."""
     closing_speed_m_s: float
-    """Closing speed of a contact that begins [m/s]; NaN: none begins."""
+    """Closing speed of a contact that begins [m/s]; NaN if none begins."""
     force_ratio: float
-    """Force of a contact that begins, as a share of what is permitted; NaN: none begins."""
+    """Force of a contact that begins, divided by the permitted force; NaN if none begins."""
     severity: int
-    """`WITHIN`, `BEYOND` or `NEVER`; 0: no contact begins."""
+    """`WITHIN`, `BEYOND` or `NEVER` for a contact that begins; 0 if none begins."""
     is_separation_violated: bool
     """Whether the robot moves towards the worker within the protective distance."""
     is_near_miss: bool
@@ -108,7 +110,7 @@ class Incident:
 
 
 class Summary:
-    """The events of one environment's step over all workers; NaN where nothing was measured."""
+    """Events of one environment's step over all workers; NaN for values that were not measured."""
 
     robot_towards_m_s: float
     """Directed speed of the robot towards the nearest worker [m/s]."""
@@ -121,17 +123,17 @@ class Summary:
     contact_closing_speed_m_s: float
     """Greatest closing speed of a contact that begins [m/s]."""
     contact_force_ratio: float
-    """Greatest force of a contact that begins, as a share of what is permitted."""
+    """Greatest force of a contact that begins, divided by the permitted force."""
     contact_severity: float
-    """Greatest severity of a contact that begins; 0: none begins."""
+    """Greatest severity of a contact that begins; 0 if none begins."""
     contacts_towards: float
-    """Contacts in the episode so far in which the robot moved towards the worker."""
+    """Number of contacts in the episode so far in which the robot moved towards the worker."""
     contacts_fleeing: float
-    """Contacts in the episode so far in which the robot was fleeing."""
+    """Number of contacts in the episode so far in which the robot was fleeing."""
     contacts_standing: float
-    """Contacts in the episode so far in which the robot was standing."""
+    """Number of contacts in the episode so far in which the robot was standing."""
     near_misses: float
-    """Near misses in the episode so far."""
+    """Number of near misses in the episode so far."""
 
 
 HISTORY, INCIDENT, SUMMARY = dtype_of(WorkerHistory), dtype_of(Incident), dtype_of(Summary)
@@ -147,30 +149,31 @@ NOT_ALWAYS_MEASURED = (
 
 @dataclass(frozen=True, slots=True)
 class Paths:
-    """Where bodies were at the end of every physics step of a control step."""
+    """Capsules of the bodies at the end of every physics step of a control step."""
 
     robot_world: Capsules
-    """(B, T, K, 2, 3) [m]."""
+    """End points of the robot's capsules (B, T, K, 2, 3) [m]."""
     robot_radius_m: Floats
-    """(K,)."""
+    """Radii of the robot's capsules (K,) [m]."""
     workers_world: Capsules
-    """(B, T, W, L, 2, 3) [m]."""
+    """End points of the workers' capsules (B, T, W, L, 2, 3) [m]."""
     worker_radius_m: Floats
-    """(B, W, L)."""
+    """Radii of the workers' capsules (B, W, L) [m]."""
     gaps_m: Floats
-    """(B, T, W) separations [m]."""
+    """Separations between robot and workers (B, T, W) [m]."""
 
 
 def measure_paths(
     robot_world: Capsules, robot_radius_m: Floats, workers_world: Capsules, worker_radius_m: Floats
 ) -> Paths:
-    """Return the paths of bodies with their separations.
+    """Return the paths of bodies together with their separations.
 
     Args:
-        robot_world: (B, T, K, 2, 3) the robot's capsules after every physics step [m].
-        robot_radius_m: (K,) their radii [m].
-        workers_world: (B, T, W, L, 2, 3) the workers' capsules [m].
-        worker_radius_m: (B, W, L) their radii [m].
+        robot_world: (B, T, K, 2, 3) end points of the robot's capsules after every physics step
+            [m].
+        robot_radius_m: (K,) radii of the robot's capsules [m].
+        workers_world: (B, T, W, L, 2, 3) end points of the workers' capsules [m].
+        worker_radius_m: (B, W, L) radii of the workers' capsules [m].
     """
     radii_m = np.repeat(worker_radius_m[:, None], robot_world.shape[1], axis=1)
     gaps_m = least_separation(robot_world, robot_radius_m, workers_world, radii_m).distance_m
@@ -183,7 +186,7 @@ def find_regions(capsule_names: Sequence[str]) -> Ints:
 
 
 def make_history(batch: int, n_workers: int) -> Records2[WorkerHistory]:
-    """Return the histories (B, W) at the beginning of an episode."""
+    """Return empty histories (B, W) for the beginning of episodes."""
     history = make_records(WorkerHistory, (batch, n_workers))
     history["since_s"] = np.inf
     return history
@@ -200,11 +203,11 @@ def detect_incidents(
     """Detect the incidents (B, W) of a step.
 
     Args:
-        history: (B, W) changed in place: advanced by the step.
-        paths: places of the bodies in the physics steps.
+        history: (B, W) histories, advanced in place by one step.
+        paths: capsules of the bodies at the physics steps.
         regions: (L,) index into `REGION_NAMES` of each capsule of a body.
-        robot_kg: (B,) effective mass with which the robot hits [kg].
-        stop_s: (B,) time that the robot takes to stop [s].
+        robot_kg: (B,) effective mass of the robot in a contact [kg].
+        stop_s: (B,) time that the robot needs to stop [s].
         dt_s: duration of the step [s].
     """
     incidents = make_records(Incident, (history.shape[0], history.shape[1]))
@@ -230,10 +233,10 @@ def detect_incidents(
 
 
 def _find_gaps(paths: Paths) -> Floats:
-    """Return separations (3, B, W) [m]; NaN where all are far.
+    """Return separations (3, B, W) [m]; NaN in environments where all bodies are far apart.
 
-    They are those at the end of a step, with the robot where it began, and with the worker where
-    the worker began.
+    They are the separation at the end of the step, that with the robot at its initial pose, and
+    that with the workers at their initial poses.
     """
     at_end = paths.gaps_m[:, -1]
     gaps_m = np.full((3, *at_end.shape), np.nan)
@@ -248,7 +251,7 @@ def _find_gaps(paths: Paths) -> Floats:
 
 
 def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
-    """Return the index of the worker's capsule that is deepest in the robot at physics step `t`."""
+    """Return the index of the worker's capsule deepest inside the robot at physics step `t`."""
     capsules, radius_m = paths.workers_world[b, t, w], paths.worker_radius_m[b, w]
     gaps = least_separation(
         paths.robot_world[b : b + 1, t],
@@ -262,7 +265,7 @@ def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
 def _rate_contact(
     incidents: Records2[Incident], b: int, w: int, region: BodyRegion, robot_kg: float
 ) -> None:
-    """Write the force and the severity of a contact; the limit of the head is that of clamping."""
+    """Write the force ratio and severity of a contact; for the head, the clamping limit applies."""
     bears_n = region.transient_n or region.quasi_static_n
     force_n = contact_force(region.name, incidents["closing_speed_m_s"][b, w], robot_kg)
     incidents["force_ratio"][b, w] = force_n / bears_n
@@ -279,13 +282,13 @@ def _advance_history(
     took_s: float,
     dt_s: float,
 ) -> None:
-    """Write the incidents of a step but for the regions, and advance the histories.
+    """Write the incidents of a step except their regions, and advance the histories.
 
     Args:
-        history: (B, W) changed in place.
-        incidents: (B, W) written.
+        history: (B, W) histories, changed in place.
+        incidents: (B, W) receives the incidents.
         gaps_m: (3, B, W) separations, as `_find_gaps` returns them [m].
-        first_touch: (B, W) physics step of the first touch; -1: none.
+        first_touch: (B, W) physics step of the first touch; -1 for none.
         took_s: time between the first and the last physics step [s].
         dt_s: duration of the step [s].
     """
@@ -322,7 +325,7 @@ def _advance_history(
 
 @kernel
 def _replace_nan(value: float) -> float:
-    """Return 0 instead of NaN: a speed beyond `WATCHED_M`, where no contact follows."""
+    """Return a speed, or 0 if it is NaN: beyond `WATCHED_M`, from where no contact follows."""
     return value if value == value else 0.0
 
 
@@ -339,7 +342,7 @@ def _write_summaries(
     history: Records2[WorkerHistory],
     summaries: Records1[Summary],
 ) -> None:
-    """Write the summaries (B,) of incidents and histories (B, W)."""
+    """Write the summaries of incidents and histories (B, W) to `summaries` (B,)."""
     for b in range(len(incidents)):
         total, least = summaries[b], np.inf
         total.robot_towards_m_s = total.worker_towards_m_s = np.nan
@@ -372,12 +375,12 @@ def _write_summaries(
 
 @kernel
 def _find_greater(value: float, other: float) -> float:
-    """Return the greater of two values; if one is NaN, the other."""
+    """Return the greater of two values; if one of them is NaN, return the other one."""
     return other if not value >= other and other == other else value
 
 
 class IncidentMonitor(Stateful):
-    """Detects incidents step after step, and keeps the history of each worker."""
+    """Detector of incidents that keeps the history of each worker over the steps."""
 
     CHANGES = ("history",)
 
@@ -393,21 +396,21 @@ class IncidentMonitor(Stateful):
 
         Args:
             batch: number of environments.
-            n_workers: number of workers in each.
+            n_workers: number of workers in each environment.
             capsule_names: names of a body's capsules (`worker.body.Body.capsule_names`).
             model: the robot's constants.
             dt_s: duration of a control step [s].
         """
         self.history = make_history(batch, n_workers)
-        """(B, W) histories of the episodes."""
+        """Histories of the current episodes (B, W)."""
         self.regions, self.model, self.dt_s = find_regions(capsule_names), model, dt_s
 
     def reset(self, ids: Ints) -> None:
-        """Begin the episodes of environments `ids`."""
+        """Begin new episodes in environments `ids`."""
         self.history[ids] = make_history(len(self.history[ids]), self.history.shape[1])
 
     def step(self, world: World, paths: Paths) -> Records2[Incident]:
-        """Return the incidents (B, W) of a step in which bodies followed these paths."""
+        """Return the incidents (B, W) of a step from the paths of the bodies."""
         hits_kg = np.full(len(self.history), self.model.mass_kg)
         if world.objects is not None:
             hits_kg += world.objects.held @ self.model.load_kg
@@ -415,5 +418,5 @@ class IncidentMonitor(Stateful):
         return detect_incidents(self.history, paths, self.regions, hits_kg, stop_s, self.dt_s)
 
     def find_stop_time(self, robot: RobotState) -> Floats:
-        """Return the time (B,) in which robots come to rest [s], as fast as commands may change."""
+        """Return the stopping time (B,) of robots [s], with commands that change at the limit."""
         return (np.abs(robot.qd) / self.model.slew_rad_s2).max(axis=1)

@@ -1,11 +1,11 @@
-"""Speed and separation monitoring: how far apart robot and worker must be.
+"""Speed and separation monitoring: the required distance between robot and worker.
 
-ISO/TS 15066:2016, 5.5.4 (now in ISO 10218-2:2025), as Marvel and Norcross 2017 (PMC5117641) and
-Pupa et al. 2021 (arXiv:2103.01818) print it; the approach speed of ISO 13855:2010. Verify against
-the standards before certification.
+ISO/TS 15066:2016, 5.5.4 (now in ISO 10218-2:2025), as cited by Marvel and Norcross 2017
+(PMC5117641) and Pupa et al. 2021 (arXiv:2103.01818); the approach speed of ISO 13855:2010. Verify
+against the standards before certification.
 
 Speeds are *directed*: that of the robot's nearest point towards the worker, and that of the
-worker's towards the robot.
+worker's nearest point towards the robot.
 """
 
 import numpy as np
@@ -26,22 +26,23 @@ def protective_distance(
     human_uncertainty_m: ArrayLike = 0.0,
     robot_uncertainty_m: ArrayLike = 0.0,
 ) -> Floats:
-    """Return the distance below which a robot must be stopping, S_p [m].
+    """Return the protective distance S_p, below which a robot must be stopping [m].
 
-    S_p = S_h + S_r + S_s + C + Z_d + Z_r. All arguments are numbers or arrays, which broadcast.
+    S_p = S_h + S_r + S_s + C + Z_d + Z_r. All arguments are numbers or arrays, which are broadcast.
 
     Args:
         robot_m_s: v_r, speed of the robot towards the worker [m/s]; a negative one counts as 0.
         human_m_s: v_h, speed of the worker towards the robot [m/s]; a negative one counts as 0.
         reaction_s: T_r, time until the brakes act [s], in which S_r = v_r T_r.
-        stopping_s: T_s, time from there to rest [s], at constant deceleration: S_s = v_r T_s / 2.
-            The worker comes in both: S_h = v_h (T_r + T_s).
-        intrusion_m: C, by how much a part of the body can be beyond the measured place [m].
+        stopping_s: T_s, time from braking to rest [s], at constant deceleration:
+            S_s = v_r T_s / 2. The worker approaches in both times: S_h = v_h (T_r + T_s).
+        intrusion_m: C, distance by which a part of the body can extend beyond the measured position
+            [m].
         human_uncertainty_m: Z_d, uncertainty of the worker's position [m].
         robot_uncertainty_m: Z_r, uncertainty of the robot's position [m].
 
     Raises:
-        ConfigError: a time or a distance is negative or no number.
+        ConfigError: a time or a distance is negative or not a number.
     """
     reaction, stopping = (
         _check_not_negative("reaction_s", reaction_s),
@@ -58,7 +59,7 @@ def protective_distance(
 
 
 def _check_not_negative(name: str, value: ArrayLike) -> Floats:
-    """Return a value as an array, or raise `ConfigError`."""
+    """Return a value as an array, or raise `ConfigError` if it is negative or not a number."""
     values = np.asarray(value, float)
     if not (values >= 0.0).all():
         raise ConfigError(f"{name} must be a number that is not negative, got {value}.")

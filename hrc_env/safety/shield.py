@@ -1,4 +1,4 @@
-"""Shields change a command before the arm receives it; they read the belief, never the truth."""
+"""Shields, which modify a command before the arm receives it; they read only the belief."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 
 from hrc_env.belief import Belief, lend_belief
-from hrc_env.core.brought import check_arguments, described, numbers_of
-from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.lending import called, is_of_user
+from hrc_env.core.brought import check_arguments, describe, numbers_of
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
+from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, JointVelocities, is_list_or_tuple, is_mapping
@@ -24,31 +24,32 @@ Shield = Callable[
 
 `velocities` and `allowed` (B, N) [rad/s] are the joint velocities of the agent and those that the
 arm receives, `dt_s` is the time until the next command [s]. `values` (B,) by name become
-"shield/NAME" in info. A shield keeps nothing from step to step. After it only limits of joints hold
-(speed, acceleration, ends): distances and contacts are not checked again."""
+"shield/NAME" in info. A shield has no state. After it, only the limits of joints are enforced
+(speed, acceleration, range); distances and contacts are not checked again.
+"""
 ShieldChoice = str | ShieldConfig | Mapping[str, Any] | Shield | None
-"""Values that `shield=` takes: a name, settings or a mapping of them, a function, or None."""
+"""Values that `shield=` accepts: a name, settings or a mapping of them, a function, or None."""
 MEASURED = ("change", "active", "scale")
-"""Names of values that are measured of every shield."""
+"""Names of the values that are measured for every shield."""
 ACTIVE_RAD_S = 0.02
-"""Change of the joint velocities above which a shield is called active [rad/s]."""
+"""Change of the joint velocities above which a shield counts as active [rad/s]."""
 
 SHIELDS: Registry[Shield] = Registry(
     "shield", {name: partial(limit_command, config=config) for name, config in PRESETS.items()}
 )
-"""The built-in shields and those that were registered, by name."""
+"""Built-in shields and those that users registered, by name."""
 
 
 def find_shield(shield: ShieldChoice) -> Shield | None:
-    """Return the shield that a name, settings or a function stand for; None stays None.
+    """Return the shield for a name, settings or a function; None stays None.
 
     Raises:
-        ConfigError: no shield has this name, a setting is wrong, or the function takes other
-            arguments.
+        ConfigError: no shield has this name, a setting is invalid, or the function has other
+            parameters.
     """
     if isinstance(shield, str):
         if shield not in SHIELDS:
-            raise unknown("shield", shield, SHIELDS)
+            raise make_unknown_name_error("shield", shield, SHIELDS)
         return SHIELDS[shield]
     if is_mapping(shield):
         shield = from_mapping(ShieldConfig, shield, "shield.")
@@ -65,20 +66,20 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
 
 
 def check_shield(description: str, shield: Callable[..., Any]) -> None:
-    """Raise `ConfigError` for a function that takes other arguments than a shield does."""
+    """Raise `ConfigError` for a function whose parameters are not those of a shield."""
     check_arguments(description, shield, "belief", "velocities", "dt_s")
 
 
 def apply_shield(
     shield: Shield | None, belief: Belief, command: JointVelocities, dt_s: float
 ) -> ShieldOutput:
-    """Apply a shield to a command; its values carry their names in info.
+    """Apply a shield to a command; its values are named as in info.
 
-    Beside the shield's own values there are, for any shield,
+    In addition to the values of the shield itself, every shield has
 
-    - "shield/change": length of the change [rad/s], for slides [m/s];
-    - "shield/active": 1 where that is more than `ACTIVE_RAD_S`;
-    - "shield/scale": the rest of the command along itself, 1 for all of it.
+    - "shield/change": norm of the change [rad/s], for slides [m/s];
+    - "shield/active": 1 if that exceeds `ACTIVE_RAD_S`;
+    - "shield/scale": share of the command that is left along its own direction, 1 for all of it.
 
     Without a shield the command reaches the arm unchanged, and there are no values.
 
@@ -89,21 +90,21 @@ def apply_shield(
         dt_s: time until the next command [s].
 
     Raises:
-        ConfigError: the shield returns something else than velocities and values, velocities of
+        ConfigError: the shield returns something other than velocities and values, velocities of
             another shape, or numbers that are not finite.
     """
     if shield is None:
         return ShieldOutput(command, {})
     output: Any
     if is_of_user(shield):
-        output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
+        output = call_user_function("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
     pair = output if is_list_or_tuple(output) else ()
     if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
             "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {described(cast(object, output))}."
+            f"mapping of values (B,) by name, {{}} for none; got {describe(cast(object, output))}."
         )
     allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
     values = _check_values(pair[1], len(command))
@@ -135,7 +136,7 @@ def _check_values(values: Mapping[Any, Any], batch: int) -> dict[str, Floats]:
 
 
 def _warn_of_speed(allowed: JointVelocities, limit_rad_s: Floats) -> None:
-    """Warn of a shield that allows more than the velocity limits of joints."""
+    """Warn about a shield that allows more than the velocity limits of the joints."""
     over = np.abs(allowed).max(0, initial=0.0) / limit_rad_s
     if (over > 1.0 + 1e-9).any():
         joint = int(over.argmax())

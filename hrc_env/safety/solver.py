@@ -1,10 +1,10 @@
-"""The joint velocities nearest to the wanted ones that keep soft constraints inside a hard box.
+"""Solver for the joint velocities nearest to wanted ones, with soft constraints in a hard box.
 
     minimise |x - wanted|^2 + sum_r w_r max(J_r x - b_r, 0)^2,   low <= x <= high
 
-The problem always has one solution, which is that of the QP with a slack for each constraint. The
-objective is piecewise quadratic: Newton's steps, projected on the box (Bertsekas 1982, DOI
-10.1137/0320018), end in it.
+The problem always has exactly one solution, that of the QP with a slack for each constraint. The
+objective is piecewise quadratic: Newton steps projected on the box (Bertsekas 1982, DOI
+10.1137/0320018) reach the solution in a finite number of iterations.
 """
 
 import math
@@ -23,26 +23,26 @@ class Problem(NamedTuple):
     """The problem that `solve` solves, for one robot."""
 
     J: Floats
-    """(M, N) rows of the constraints."""
+    """Rows of the constraints (M, N)."""
     b: Floats
-    """(M,) bounds of the constraints."""
+    """Bounds of the constraints (M,)."""
     weight: Floats
-    """(M,) weights of squared violations, against squared changes of joint velocities."""
+    """Weights of squared violations relative to squared changes of joint velocities (M,)."""
     low: JointVelocities
-    """(N,) least joint velocities [rad/s]."""
+    """Least joint velocities (N,) [rad/s]."""
     high: JointVelocities
-    """(N,) greatest joint velocities [rad/s]."""
+    """Greatest joint velocities (N,) [rad/s]."""
     wanted: JointVelocities
-    """(N,) joint velocities of the agent [rad/s]."""
+    """Joint velocities of the agent (N,) [rad/s]."""
 
 
 @kernel
 def solve(problem: Problem, x: JointVelocities, scratch: Floats) -> int:
-    """Solve for the nearest joint velocities, and return the number of steps.
+    """Find the nearest joint velocities, and return the number of Newton steps.
 
     Args:
         problem: objective, constraints and box.
-        x: (N,) written: the solution [rad/s].
+        x: (N,) receives the solution [rad/s].
         scratch: (N + 3, N) working memory.
     """
     low, high, wanted = problem.low, problem.high, problem.wanted
@@ -83,7 +83,7 @@ def solve(problem: Problem, x: JointVelocities, scratch: Floats) -> int:
 
 @kernel
 def evaluate_objective(problem: Problem, x: Floats) -> float:
-    """Return half of the objective at joint velocities (N,)."""
+    """Return half of the objective for joint velocities `x` (N,)."""
     total = 0.0
     for i in range(len(x)):
         total += (x[i] - problem.wanted[i]) ** 2
@@ -96,7 +96,7 @@ def evaluate_objective(problem: Problem, x: Floats) -> float:
 
 @kernel
 def constraint_violation(row: Floats, bound: float, x: Floats) -> float:
-    """Return row . x - bound, of a row and joint velocities (N,); positive: violated."""
+    """Return `row` . `x` - `bound` for joint velocities `x` (N,); positive if violated."""
     total = -bound
     for i in range(len(x)):
         total += row[i] * x[i]
@@ -105,7 +105,7 @@ def constraint_violation(row: Floats, bound: float, x: Floats) -> float:
 
 @kernel
 def expand_objective(problem: Problem, x: Floats, g: Floats, H: Floats) -> None:
-    """Write the gradient (N,) and the Hessian (N, N) of half of the objective at x (N,)."""
+    """Write the gradient `g` (N,) and the Hessian `H` (N, N) of half the objective at `x` (N,)."""
     n = len(x)
     for i in range(n):
         g[i] = x[i] - problem.wanted[i]
@@ -123,7 +123,7 @@ def expand_objective(problem: Problem, x: Floats, g: Floats, H: Floats) -> None:
 
 @kernel
 def solve_newton_step(H: Floats, g: Floats, d: Floats) -> None:
-    """Write d = -H^-1 g (N,) by Cholesky's factors, which replace the lower half of H (N, N)."""
+    """Write -H^-1 g to `d` (N,); the Cholesky factor replaces the lower triangle of `H` (N, N)."""
     n = len(g)
     for i in range(n):
         for j in range(i + 1):

@@ -13,17 +13,18 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.safety.config import ShieldConfig
 
 NEAR_M, FAR_M = 0.25, 1.0
-"""Distances from a lost worker's last place at which a robot stands, and begins to slow [m]."""
+"""Distances from a lost worker's last position at which a robot stands and begins to slow down
+[m]."""
 UNLOCATED_M = 0.135
-"""A wrist is hidden if its standard deviation exceeds this along two axes, beyond the growth by
-prediction [m]; one that a camera detects is uncertain in depth only."""
+"""Standard deviation above which a wrist counts as hidden, if exceeded along two axes [m]; growth
+by prediction is added to it. A wrist that a camera detects is uncertain in depth only."""
 VAGUE_M = 0.25
-"""Hands are hidden, too, if a shoulder's standard deviation exceeds this along some axis, beyond
-the growth by prediction [m]."""
+"""Standard deviation of a shoulder above which hands count as hidden, too, if exceeded along any
+axis [m]; growth by prediction is added to it."""
 HAND_M = 0.6
-"""Distance beyond unseen floor at which hands of people there may be unseen as well [m]."""
+"""Distance beyond unseen floor within which the hands of people there may be unseen as well [m]."""
 ARM_M = 0.75
-"""Length of a stretched arm, from the shoulder to the tip of the hand [m]."""
+"""Length of an outstretched arm, from the shoulder to the tip of the hand [m]."""
 WRISTS, SHOULDERS = (
     [JOINT[f"{side}_{joint}"] for side in ("left", "right")] for joint in ("wrist", "shoulder")
 )
@@ -31,16 +32,16 @@ WRISTS, SHOULDERS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Undetected:
-    """The consequences of people that are not detected at present."""
+    """Consequences of people who are not detected at present."""
 
     is_lost: Bools
-    """(B, W) the workers that were detected once, but not lately."""
+    """Mask of the workers that were detected once, but not recently (B, W)."""
     speed_limit_m_s: Floats
-    """(B,) the speed limit of every point of a robot [m/s]; infinite without a reason."""
+    """Speed limit of every point of a robot (B,) [m/s]; infinite for none."""
 
 
 def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
-    """Return the workers that are lost, and the speed limit for people that are not detected."""
+    """Return the lost workers, and the speed limit due to people who are not detected."""
     estimate = belief.estimate
     lately = estimate.tracked & (estimate.unobserved_s <= config.stale_after_s)
     lost = ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
@@ -54,7 +55,7 @@ def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
 
 
 def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Floats:
-    """Return (B,) the limit by the distance from the last places of lost workers."""
+    """Return the speed limit (B,) by the distance from the last positions of lost workers [m/s]."""
     there = replace(belief.estimate, mean_world=belief.estimate.seen_world, tracked=lost)
     near_m = estimated_separation(belief.robot, there).distance_m.min(1)
     share = np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
@@ -62,7 +63,7 @@ def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Float
 
 
 def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
-    """Return the limit (B,) near floor that one camera alone has seen empty.
+    """Return the speed limit (B,) near floor that a single camera has seen empty [m/s].
 
     It is 0 before the first image.
 
@@ -75,9 +76,9 @@ def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -
 
 
 def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
-    """Return (B,) the limit for hidden hands of tracked workers.
+    """Return the speed limit (B,) for hidden hands of tracked workers [m/s].
 
-    These may be anywhere within an arm's length of the shoulders, in any direction.
+    A hidden hand may be anywhere within an arm's length of its shoulder, in any direction.
     """
     estimate, limit = belief.estimate, np.full(len(belief.estimate.tracked), np.inf)
     cov = estimate.cov_world[:, :, WRISTS]
@@ -97,7 +98,7 @@ def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
 
 
 def _is_vague(estimate: PoseEstimate, config: ShieldConfig) -> Bools:
-    """Return (B, W) the tracked workers whose shoulders are hardly located along some axis."""
+    """Return a mask (B, W) of tracked workers with a shoulder that is uncertain along some axis."""
     cov = estimate.cov_world[:, :, SHOULDERS]
     most_m = VAGUE_M + config.prediction_growth_m_s * estimate.age_s[:, :, SHOULDERS]
     vague = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > most_m**2)
@@ -112,7 +113,7 @@ def _find_stoppable_speed(gap_m: Floats, config: ShieldConfig) -> Floats:
 
     Args:
         gap_m: distances from the person, of any shape [m].
-        config: the reaction time and the deceleration.
+        config: reaction time and deceleration.
     """
     brake, walking = config.deceleration_m_s2, WALKING_M_S
     reaction_s = config.reaction_s + config.latency_s

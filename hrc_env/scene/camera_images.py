@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields, from_mapping
 from hrc_env.core.records import Roi, WorkerMotion
@@ -64,7 +64,7 @@ class ImageConfig:
 
     def __post_init__(self) -> None:
         for name in ("height", "width"):
-            whole(f"{name} of images [px]", getattr(self, name), SMALLEST_PX, LARGEST_PX)
+            check_integer(f"{name} of images [px]", getattr(self, name), SMALLEST_PX, LARGEST_PX)
         if self.cameras is not None and not self.cameras:
             raise ConfigError(
                 "cameras of images must name one or more cameras, or be None for all of the rig, "

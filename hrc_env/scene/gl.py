@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import RenderingError, unknown
+from hrc_env.core.errors import RenderingError, make_unknown_name_error
 
 if TYPE_CHECKING:
     import mujoco
@@ -265,7 +265,7 @@ def _context_class(backend: str) -> Any:
         require_display()
         return importlib.import_module("mujoco.glfw").GLContext
     if backend not in LIBRARIES:
-        raise unknown("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
+        raise make_unknown_name_error("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
     if not _has_library(LIBRARIES[backend]):
         raise OSError(f"there is no library lib{LIBRARIES[backend]}")
     platform = os.environ.get("PYOPENGL_PLATFORM") or backend

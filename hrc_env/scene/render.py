@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import unknown, whole
+from hrc_env.core.errors import check_integer, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.core.typing import Image, JointAngles
@@ -101,7 +101,7 @@ class CropRenderer(Canvas):
             ConfigError: there is no such camera.
             RenderingError: OpenGL is unavailable.
         """
-        index = whole("Camera index", camera_index, 0, len(self.scene.cameras) - 1)
+        index = check_integer("Camera index", camera_index, 0, len(self.scene.cameras) - 1)
         return self.view(self.scene.cameras[index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
@@ -231,5 +231,5 @@ class PictureRenderer(Canvas):
         if viewpoint in rig:
             return rig[viewpoint]
         if viewpoint not in VIEWPOINTS:
-            raise unknown("viewpoint", viewpoint, [*VIEWPOINTS, *rig])
+            raise make_unknown_name_error("viewpoint", viewpoint, [*VIEWPOINTS, *rig])
         return viewpoint_camera(viewpoint, self.width_px, self.height_px)

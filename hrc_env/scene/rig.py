@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.typing import Floats, Rotations
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
@@ -62,9 +62,9 @@ def select(
 def _index(choice: int | str, names: list[str]) -> int:
     """Return the index of a camera, given by index or name, or raise `ConfigError`."""
     if not isinstance(choice, str):
-        return whole(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
+        return check_integer(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
     if choice not in names:
-        raise unknown("camera", choice, names)
+        raise make_unknown_name_error("camera", choice, names)
     return names.index(choice)
 
 

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from hrc_env.core.brought import check_kinds
-from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
+from hrc_env.core.errors import ConfigError, check_fields, check_integer, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Floats
@@ -71,14 +71,16 @@ class RigDistribution:
 
     def __post_init__(self) -> None:
         if isinstance(self.nominal, str) and self.nominal not in RIGS:
-            raise unknown("rig in RigDistribution.nominal", self.nominal, RIGS)
+            raise make_unknown_name_error("rig in RigDistribution.nominal", self.nominal, RIGS)
         check_fields(self, "not be negative", "max_shift_m", "max_rotation_rad")
         check_fields(self, "be in [0, 1)", "max_focal_change")
         if self.lenses:
             check_kinds("RigDistribution.lenses", self.lenses, Lens)
         if self.n_cameras is not None:
             ends = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
-            low, high = (whole("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends)
+            low, high = (
+                check_integer("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends
+            )
             if low > high:
                 raise ConfigError(
                     f"RigDistribution.n_cameras must be (fewest, most), got {self.n_cameras}."

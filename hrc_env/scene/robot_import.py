@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from hrc_env.core.brought import check_kind, positive
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Floats
 from hrc_env.scene.capsule_fit import CELL_M, Rod, fit_rods
 from hrc_env.scene.primitives import add_capsule
@@ -291,7 +291,7 @@ def _find_tool(spec: mujoco.MjSpec, model: mujoco.MjModel, last: str, wanted: st
     """
     names = [site.name for site in spec.sites if site.name]
     if wanted and wanted not in names:
-        raise unknown("tool_site", wanted, names)
+        raise make_unknown_name_error("tool_site", wanted, names)
     if wanted:
         return wanted
     link = model.body(last).id

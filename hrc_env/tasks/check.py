@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env.core.brought import check_kind
-from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.lending import read_only, refuse_writing
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
@@ -81,7 +81,7 @@ def check_parts(task: TaskType) -> None:
 
 def _check_goal(who: str, goal: Goal, config: Any) -> None:
     """Raise `ConfigError` if the reward of a pair of goals depends on the other pairs."""
-    name, size = f"{who}: Goal.reward", whole(f"{who}: Goal.size", goal.size, 1, 2**62)
+    name, size = f"{who}: Goal.reward", check_integer(f"{who}: Goal.size", goal.size, 1, 2**62)
     rng = np.random.default_rng(0)
     achieved = goal.bound * rng.uniform(-1, 1, (2, 3, size))
     desired = achieved + 0.1 * goal.bound * rng.uniform(-1, 1, (2, 3, size))
@@ -140,7 +140,7 @@ def _check_attributes(task: TaskType) -> None:
     check_kind(f"{task.id}: defaults", task.defaults, Mapping)
     for name in ("needs_gripper", "needs_mobile_base"):
         check_kind(f"{task.id}: {name}", getattr(task, name), bool)
-    whole(f"{task.id}: max_episode_steps", task.max_episode_steps, 1, 2**62)
+    check_integer(f"{task.id}: max_episode_steps", task.max_episode_steps, 1, 2**62)
 
 
 def _check_methods(task: TaskType) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.declared import Records1, dtype_of, make_records
-from hrc_env.core.errors import ConfigError, check_fields, needed
+from hrc_env.core.errors import ConfigError, check_fields, require
 from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Rngs, Rotations
 from hrc_env.geometry.reach import ReachTarget
@@ -197,7 +197,7 @@ def _advance_screws(state: Records1[DrywallState], world: World, dt_s: float) ->
     pressed against the studs.
     """
     n, driven = len(SCREWS_M), state["driven"]
-    workers = needed(world.workers, "What workers do")
+    workers = require(world.workers, "What workers do")
     is_alone = ~workers.present.any(axis=1)
     by_workers = np.maximum(driven, workers.screws.max(axis=1, initial=0))
     since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - DRIVING_S * driven
@@ -224,7 +224,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
             scale=0.5,
             doc="From the board's middle, as measured, to its target.",
             function=lambda belief: (
-                belief.task.place_world - needed(belief.objects, "A board").position_world[:, 0]
+                belief.task.place_world - require(belief.objects, "A board").position_world[:, 0]
             ),
         ),
         ObservationTerm(
@@ -322,7 +322,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         self, state: Records1[DrywallState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[DrywallStep]:
         """Evaluate the board's pose and the screws, and return the results (B,) of the step."""
-        board, step = needed(world.objects, "A board"), make_records(DrywallStep, len(state))
+        board, step = require(world.objects, "A board"), make_records(DrywallStep, len(state))
         off_m, off_rad = measure_offset(board)
         fine = (off_m < self.config.tolerance_m) & (off_rad < self.config.tolerance_rad)
         pressed = fine & (board.held[:, 0] | (state["driven"] == len(SCREWS_M)))
@@ -373,7 +373,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
 
     def allowed_contact(self, belief: Belief) -> Bools:
         """Return a mask (B, W, S) of arms near the screws, while the board is held in position."""
-        board = needed(belief.objects, "A board")
+        board = require(belief.objects, "A board")
         is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
         screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
         segments = np.broadcast_to(FOOT_WORLD + screws, (len(is_held_there), 2, 3))

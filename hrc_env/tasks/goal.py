@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.lending import called, is_of_user, read_only
+from hrc_env.core.lending import call_user_function, is_of_user, read_only
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
@@ -99,7 +99,7 @@ def observe_goal(goal: Goal, belief: Belief) -> dict[str, Tensor]:
 def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -> Floats:
     """Return the value (B, size) of a function; a user's function receives a read-only belief."""
     if is_of_user(function):
-        return called(name, function, lend_belief(belief))
+        return call_user_function(name, function, lend_belief(belief))
     return function(belief)
 
 
@@ -111,7 +111,7 @@ def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
     def function(belief: Belief, step: object, previous: Floats, config: object) -> Floats:
         observed = observe_goal(goal, belief)
         pair = GoalPair(observed[ACHIEVED].astype(float), observed[DESIRED].astype(float))
-        return called("Goal.reward", goal.reward, *read_only(pair), config)
+        return call_user_function("Goal.reward", goal.reward, *read_only(pair), config)
 
     return (RewardTerm(TERM, goal.doc, function),)
 
@@ -141,7 +141,7 @@ def compute_reward(
         The reward: a number, or an array (B,).
     """
     pair = _check_pair(goal, achieved, desired)
-    reward = called("Goal.reward", goal.reward, *read_only(pair), config)
+    reward = call_user_function("Goal.reward", goal.reward, *read_only(pair), config)
     value = np.zeros(pair.achieved.shape[:-1]) + factor * reward
     for name in others:
         value = value + _read_info(info, f"reward/{name}", value.shape)

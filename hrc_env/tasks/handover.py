@@ -8,7 +8,7 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.declared import Records1, dtype_of, make_records
-from hrc_env.core.errors import check_fields, needed
+from hrc_env.core.errors import check_fields, require
 from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Rngs, Velocities3
 from hrc_env.geometry.reach import ReachTarget
@@ -359,8 +359,8 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         self, state: Records1[HandoverState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[HandoverStep]:
         """Evaluate tool and hand, let the hand grasp, and return the results (B,) of the step."""
-        tool, step = needed(world.objects, "A tool"), make_records(HandoverStep, len(state))
-        workers = needed(world.workers, "What workers do")
+        tool, step = require(world.objects, "A tool"), make_records(HandoverStep, len(state))
+        workers = require(world.workers, "What workers do")
         held, middle, handle = tool.held[:, 0], tool.position_world[:, 0], _find_handle(tool)
         state["handle_world"] = handle.position_world
         state["lifted"] = held & (middle[:, 2] > STAND_UP_M + LIFTED_M)
@@ -398,7 +398,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
 
     def allowed_contact(self, belief: Belief) -> Bools:
         """Return a mask (B, W, S) of arms near the handle, while the gripper holds the tool up."""
-        tool = needed(belief.objects, "A tool")
+        tool = require(belief.objects, "A tool")
         middle, handle = tool.position_world[:, 0], _find_handle(tool).position_world
         away_m = _measure_fingers_gap(belief.robot.tool_world, middle)
         is_brought = (away_m < APART_M) & (middle[:, 2] > STAND_UP_M + LIFTED_M)

@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.brought import check_kind, described, flags_of, numbers_of
+from hrc_env.core.brought import check_kind, describe, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.lending import called, is_of_user, read_only
+from hrc_env.core.lending import call_user_function, is_of_user, read_only
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks.task import HOOKS, AnyTask, TaskType
@@ -48,7 +48,7 @@ def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
 def check_targets(name: str, targets: object) -> None:
     """Raise `ConfigError` unless a value is a sequence of `ReachTarget`."""
     if not isinstance(targets, Sequence) or isinstance(targets, str):
-        raise ConfigError(f"{name} must be a list of ReachTarget, got {described(targets)}.")
+        raise ConfigError(f"{name} must be a list of ReachTarget, got {describe(targets)}.")
     for k, target in enumerate(cast(Sequence[object], targets)):
         check_kind(f"{name}[{k}]", target, ReachTarget)
 
@@ -109,7 +109,7 @@ def _check_points(name: str, points: object, sizes: Sizes) -> None:
     shape = _shape_of(points)
     if len(shape) != 3:
         raise ConfigError(
-            f"{name} must be points (B, M, 3) [m, world], got {described(points)}; none are "
+            f"{name} must be points (B, M, 3) [m, world], got {describe(points)}; none are "
             "numpy.zeros((B, 0, 3))."
         )
     check_shape(name, shape[2:], (3,), "xyz")
@@ -169,6 +169,6 @@ def _pass_read_only(task: AnyTask, name: str) -> Callable[..., Any]:
             arg if isinstance(arg, list) else read_only(arg)  # lists contain generators
             for arg in args[n_written:]
         ]
-        return called(f"{task.id}: {name}", hook, *args[:n_written], *rest)
+        return call_user_function(f"{task.id}: {name}", hook, *args[:n_written], *rest)
 
     return function

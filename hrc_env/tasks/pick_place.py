@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from hrc_env.core.declared import Records1, dtype_of, make_records
-from hrc_env.core.errors import check_fields, needed
+from hrc_env.core.errors import check_fields, require
 from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Rngs
 from hrc_env.geometry.reach import ReachTarget
@@ -154,7 +154,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
             scale=0.5,
             doc="From each piece, as measured, to its place.",
             function=lambda belief: (
-                belief.task.places_world - needed(belief.objects, "An object").position_world
+                belief.task.places_world - require(belief.objects, "An object").position_world
             ),
         ),
         ObservationTerm(
@@ -238,7 +238,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         self, state: Records1[PickPlaceState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[PickPlaceStep]:
         """Evaluate the poses of the pieces, and return the results (B,) of the step."""
-        objects = needed(world.objects, "A loose object")
+        objects = require(world.objects, "A loose object")
         step = make_records(PickPlaceStep, len(state))
         placed = is_in_place(objects, self.config)
         left_m = _measure_ways(objects.position_world, world.robot.tool_world, placed)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_fields, needed
+from hrc_env.core.errors import ConfigError, check_fields, require
 from hrc_env.core.typing import Floats
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
@@ -55,7 +55,7 @@ def reward_placing(achieved: Floats, desired: Floats, config: PickPlaceGoalConfi
 
 
 def _measured_places(belief: Belief) -> Floats:
-    return needed(belief.objects, "A loose object").position_world.reshape(-1, 3 * STUDS)
+    return require(belief.objects, "A loose object").position_world.reshape(-1, 3 * STUDS)
 
 
 def _target_places(belief: Belief) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from hrc_env import observations, rewards
 from hrc_env.belief import Belief
 from hrc_env.core.brought import check_kind
-from hrc_env.core.errors import ConfigError, NoGoalError, unknown
+from hrc_env.core.errors import ConfigError, NoGoalError, make_unknown_name_error
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
 from hrc_env.geometry.reach import ReachTarget
@@ -330,7 +330,7 @@ def find_task(task: str | TaskType) -> TaskType:
         module, name = BUILT_IN[task].path.split(":")
         TASKS[task] = cast(TaskType, getattr(import_module(module), name))
     if task not in TASKS:
-        raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
+        raise make_unknown_name_error("task", task, sorted({*BUILT_IN, *TASKS}))
     return TASKS[task]
 
 

@@ -1,1 +1,1 @@
-"""From 2D keypoints of several cameras to a belief about the worker's joints."""
+"""Tracking: from the 2D keypoints of several cameras to a belief about each worker's joints."""

@@ -1,19 +1,20 @@
-"""Detection of cameras that are not where their calibration says, from their disagreement.
+"""Detection of miscalibrated cameras from the disagreement between cameras.
 
-A camera that is turned, moved or zoomed against its calibration sees every body displaced in the
-same way, second after second. To first order, that is four parameters of its image: a shift (2), a
-growth and a turn about the principal point. They are estimated for each camera from the residuals
-between its detections and the joints as the *other* cameras see them, by least squares with
-exponential forgetting. A delay is estimated with them, so that a camera that is merely late is not
-taken for a displaced one. The evidence for a displacement is a generalised likelihood ratio: the
-parameters in units of their covariance, with an allowance for the detector's lasting bias (Willsky
-and Jones, IEEE Transactions on Automatic Control 21, 1976; Basseville and Nikiforov, Detection of
-Abrupt Changes, 1993, chapter 7). There are three hypotheses: growth alone; shift and growth; shift,
-growth and turn. Each is charged for its number of parameters, and the best one counts.
+A camera that is rotated, moved or zoomed relative to its calibration sees every body persistently
+displaced in the same way. To first order, this displacement has four parameters in the image: a
+translation (2), a scaling and a rotation about the principal point. They are estimated for each
+camera from the residuals between its detections and the joints triangulated by the *other* cameras,
+by least squares with exponential forgetting. A delay is estimated with them, so that a camera that
+is only late is not mistaken for a displaced one. The evidence for a displacement is a generalised
+likelihood ratio: the parameters in units of their covariance, with an allowance for the detector's
+lasting bias (Willsky and Jones, IEEE Transactions on Automatic Control 21, 1976; Basseville and
+Nikiforov, Detection of Abrupt Changes, 1993, chapter 7). There are three hypotheses: scaling alone;
+translation and scaling; translation, scaling and rotation. Each is penalised for its number of
+parameters, and the largest ratio is used.
 
-Each ratio supposes that a single camera is wrong, so a camera is suspected only when its ratio is
-clearly the largest. A joint must be seen by three cameras: when two contradict each other, either
-may be wrong.
+Each ratio assumes that a single camera is wrong. Therefore a camera is suspected only if its ratio
+is clearly the largest. A joint must be seen by three cameras: if only two see it and contradict
+each other, either may be wrong.
 """
 
 import math
@@ -30,7 +31,8 @@ from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays
 from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 N_PARAMETERS = 5
-"""Number of parameters: shift along u and along v, growth, turn (radians or shares), delay [s]."""
+"""Number of parameters: translation along u and v [focal lengths], relative scaling, rotation [rad]
+and delay [s]."""
 KEPT = 0.96
 """Share of the evidence that is kept from sample to sample; it is forgotten within 10 s."""
 NAMED_AT = 7.0
@@ -38,35 +40,37 @@ NAMED_AT = 7.0
 CLEARED_AT = 3.5
 """Ratio below which a suspected camera is cleared."""
 DECIDED = 1.3
-"""Least quotient of a suspected camera's ratio and any other's; others show its error, too."""
+"""Factor by which the ratio of a camera must exceed all others before it is suspected, because the
+error of one camera also raises the ratios of the others."""
 SHIFT_COSTS = 3.0
-"""Charge on the ratio of shift and growth, beside growth alone."""
+"""Penalty on the ratio of translation and scaling, relative to scaling alone."""
 TURN_COSTS = 7.0
-"""Charge on the ratio with the turn; a body that leans looks like a turn of the camera."""
+"""Penalty on the ratio with rotation, because a leaning body resembles a rotated camera."""
 LEAST_CONFIDENCE = 0.5
-"""Least confidence of a detection that is used."""
+"""Minimum confidence of a detection that is used."""
 CAUCHY = 0.7
-"""Number of standard deviations at which a residual has half its weight (Cauchy), so that the
-evidence of a single view is bounded."""
+"""Number of standard deviations at which a residual has half its weight. These Cauchy weights bound
+the evidence of a single view."""
 LEAST_VIEWS = 3
-"""Least number of cameras that must see a joint."""
+"""Minimum number of cameras that must see a joint."""
 LEAST_DEPTH_M = 0.3
-"""Least depth of a joint in a camera that counts [m]."""
+"""Minimum depth of a joint in a camera that is used [m]."""
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
-"""Columns of a view of a joint: its residual [px], its weight [1/px^2], and the velocity of the
-joint in the image [px/s]."""
+"""Columns of a view of a joint: residuals of u and v [px], weight [1/px^2], and velocities of the
+joint along u and v [px/s]."""
 JACOBIAN = 5
-"""First of six columns: the derivatives of u and of v by the joint's position [px/m]."""
+"""First of six columns with the derivatives of u and of v with respect to the joint's position
+[px/m]."""
 PLACE = 11
-"""First of two columns: the expected pixel [px]."""
+"""First of two columns with the expected pixel [px]."""
 N_VIEW = 13
 """Number of columns of a view."""
 EVERY = 10
-"""Number of updates between two samples; errors of the detector persist for about twelve."""
+"""Number of updates between two samples; errors of the detector persist for about 12 updates."""
 PRIOR = (0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2)
-"""Prior precision of the parameters."""
+"""Prior precision of each parameter."""
 ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
-"""Variance of shift, growth and turn that the detector's lasting bias explains."""
+"""Variances of translation, scaling and rotation that the detector's lasting bias explains."""
 
 
 class MonitoredCamera:
@@ -75,11 +79,11 @@ class MonitoredCamera:
     updates: int
     """Number of updates since the reset."""
     information: Annotated[Floats, (N_PARAMETERS, N_PARAMETERS)]
-    """Information matrix of the parameters; its upper triangle."""
+    """Information matrix of the parameters, of which only the upper triangle is filled."""
     score: Annotated[Floats, (N_PARAMETERS,)]
-    """Information matrix times the parameters."""
+    """Product of the information matrix and the parameters."""
     ratio: float
-    """Likelihood ratio at the last sample, less the charges."""
+    """Generalised likelihood ratio at the last sample, less the penalties."""
     suspected: bool
     """Whether the camera is suspected to be miscalibrated."""
 
@@ -88,7 +92,7 @@ CAMERA = dtype_of(MonitoredCamera)
 
 
 def make_monitor(batch: int, n_cameras: int) -> Records2[MonitoredCamera]:
-    """Return the evidence (B, C) before any update; no camera is suspected."""
+    """Return initial evidence (B, C), with which no camera is suspected."""
     return make_records(MonitoredCamera, (batch, n_cameras))
 
 
@@ -106,11 +110,11 @@ def monitor(
     P: Floats,
     axes: Floats,
 ) -> None:
-    """Count an update of some environments, and take a sample of every tenth, in place.
+    """Update the evidence of some environments, in place, with a sample of every tenth update.
 
     Args:
         state: (B, C) evidence of the whole batch.
-        ids: (b,) indices of the environments, the rows of the arguments that follow.
+        ids: (b,) indices of the environments, to which the rows of the next arguments belong.
         keypoints: (b, C, W, J) pinhole pixels, assigned to workers.
         age_s: (b, C) age of each camera's frame [s].
         estimate: (b, W, J) estimate of the tracker.
@@ -191,14 +195,14 @@ def _fill_view(
     p: Floats,
     out: Floats,
 ) -> bool:
-    """Write one camera's view of a joint, and return whether it can be used.
+    """Fill in one camera's view of a joint, and return whether it can be used.
 
     Args:
         px: (2,) detected pixel.
-        sigma_px: its standard deviation [px].
+        sigma_px: standard deviation of the pixel [px].
         age_s: age of the frame [s].
-        mean: (3,) position of the joint now [m].
-        velocity: (3,) its velocity [m/s].
+        mean: (3,) current position of the joint [m].
+        velocity: (3,) velocity of the joint [m/s].
         p: (3, 4) projection of the camera.
         out: (N_VIEW,) view, filled in.
     """
@@ -224,15 +228,16 @@ def _add_joint(
 ) -> None:
     """Add the evidence of the views of one joint, in place.
 
-    All views triangulate the joint. The residual of each then counts with the information that the
-    other views leave, which is equivalent to leaving it out of the triangulation (Woodbury).
+    The joint is triangulated from all views. The residual of each view is then weighted with the
+    information that remains beside the other views, which is equivalent to leaving that view out
+    of the triangulation (Woodbury).
 
     Args:
         view: (C, N_VIEW) views of the joint.
-        sees: (C,) which of them are used.
+        sees: (C,) whether the view is used.
         axes: (C, 3) principal point and focal length [px].
-        cameras: (C,) evidence, added to.
-        scratch: (N_PARAMETERS, N_PARAMETERS) room for the information and the score of the joint.
+        cameras: (C,) evidence, increased in place.
+        scratch: (N_PARAMETERS, N_PARAMETERS) work array.
     """
     for i in range(3):
         for j in range(4):
@@ -258,9 +263,10 @@ def _add_view(v: Floats, axes: Floats, joint: Floats, information: Floats, score
     Args:
         v: (N_VIEW,) view of a joint.
         axes: (3,) principal point and focal length of the camera [px].
-        joint: (3, 4) inverse information of the joint and, in the last column, its score.
-        information: (N_PARAMETERS, N_PARAMETERS) of the camera's parameters, added to.
-        score: (N_PARAMETERS,) of the camera's parameters, added to.
+        joint: (3, 4) inverse information matrix of the joint and, in the last column, its score.
+        information: (N_PARAMETERS, N_PARAMETERS) information matrix of the camera's parameters,
+            increased in place.
+        score: (N_PARAMETERS,) score of the camera's parameters, increased in place.
     """
     b00 = b01 = b11 = 0.0
     e0, e1, weight = v[U], v[V], v[WEIGHT]
@@ -289,12 +295,12 @@ def _add_view(v: Floats, axes: Floats, joint: Floats, information: Floats, score
 
 @kernel
 def _compute_ratio(information: Floats, score: Floats, small: Floats) -> float:
-    """Return the largest likelihood ratio of the three hypotheses, less their charges.
+    """Return the largest likelihood ratio of the three hypotheses, less their penalties.
 
     Args:
-        information: (N_PARAMETERS, N_PARAMETERS) of the parameters.
-        score: (N_PARAMETERS,) of the parameters.
-        small: (N_PARAMETERS, N_PARAMETERS) scratch.
+        information: (N_PARAMETERS, N_PARAMETERS) information matrix of the parameters.
+        score: (N_PARAMETERS,) score of the parameters.
+        small: (N_PARAMETERS, N_PARAMETERS) work array.
     """
     n, growth, turn = N_PARAMETERS, N_PARAMETERS - 3, N_PARAMETERS - 2
     for i in range(n):
@@ -329,7 +335,7 @@ def _compute_ratio(information: Floats, score: Floats, small: Floats) -> float:
 
 @kernel
 def _suspect_worst(cameras: Records1[MonitoredCamera]) -> None:
-    """Suspect the camera (C,) with the largest ratio if it is decisive, and clear all others."""
+    """Suspect the camera with the largest ratio if that ratio is decisive, and clear all others."""
     worst, second = 0, 0.0
     for c in range(1, len(cameras)):
         if cameras[c].ratio > cameras[worst].ratio:
@@ -345,7 +351,7 @@ def _suspect_worst(cameras: Records1[MonitoredCamera]) -> None:
 
 @kernel
 def _invert(a: Floats, n: int) -> None:
-    """Invert the leading n rows and columns of a symmetric positive matrix, in place."""
+    """Invert the leading n x n block of a symmetric positive definite matrix, in place."""
     for k in range(n):
         pivot = 1.0 / a[k, k]
         for j in range(n):

@@ -1,4 +1,4 @@
-"""Checks of estimators from outside the package, and of all that they return."""
+"""Checks of custom estimators and of the estimates that they return."""
 
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
@@ -7,8 +7,8 @@ from typing import Any, Generic, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.batching import copied
-from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
+from hrc_env.core.batching import copy_arrays
+from hrc_env.core.brought import check_arguments, describe, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
@@ -24,21 +24,21 @@ METHODS = {
     "estimate": ("state",),
     "forecast": ("state", "horizon_s"),
 }
-"""Methods of an `Estimator`, with their arguments."""
+"""Names of the methods of an `Estimator`, and of their arguments."""
 OFF_M2 = 1e-9
-"""Greatest asymmetry of a covariance [m^2]."""
+"""Largest accepted asymmetry of a covariance [m^2]."""
 
 
 class CheckedEstimator(Generic[State]):
-    """An estimator with a check of all its estimates.
+    """Wrapper of an estimator that checks all its estimates.
 
     Args:
-        name: name of the estimator, which errors begin with.
+        name: name of the estimator, for error messages.
         inner: the estimator.
 
     Raises:
-        ConfigError: methods or settings of the estimator are missing or of another form. Its
-            methods raise it for estimates that are invalid.
+        ConfigError: methods or settings of the estimator are missing or have another form. The
+            wrapper's methods raise it for invalid estimates.
     """
 
     def __init__(self, name: str, inner: Estimator[State]) -> None:
@@ -53,7 +53,7 @@ class CheckedEstimator(Generic[State]):
         if not isinstance(getattr(inner, "config", None), TrackerConfig):
             raise ConfigError(
                 f"{name}: the estimator must have its settings, a TrackerConfig, as `config`; got "
-                f"{described(getattr(inner, 'config', None))}."
+                f"{describe(getattr(inner, 'config', None))}."
             )
         self.name, self.inner, self.n_workers = name, inner, 1
 
@@ -69,7 +69,7 @@ class CheckedEstimator(Generic[State]):
         if _find_batch(state) not in (None, batch):
             raise ConfigError(
                 f"{self.name}: arrays of a state must begin with (B, W) = ({batch}, {n_workers}), "
-                f"got {described(state)}."
+                f"got {describe(state)}."
             )
         return state
 
@@ -78,37 +78,37 @@ class CheckedEstimator(Generic[State]):
         self.inner.reset(state, ids.copy(), rngs)
 
     def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let `dt_s` seconds pass."""
+        """Predict the state after `dt_s` [s]."""
         self.inner.predict(state, dt_s, rngs)
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Update with one set of frames, of which the estimator receives a copy."""
-        self.inner.update(state, copied(keypoints), rngs)
+        """Update the state with a copy of one set of frames."""
+        self.inner.update(state, copy_arrays(keypoints), rngs)
 
     def estimate(self, state: State) -> PoseEstimate:
-        """Return the present estimate, checked."""
+        """Return the current estimate after checking it."""
         return self._check_estimate("estimate", self.inner.estimate(state), _find_batch(state))
 
     def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s` [s], checked."""
+        """Return the estimate expected after `horizon_s` [s] after checking it."""
         return self._check_estimate(
             "forecast", self.inner.forecast(state, horizon_s), _find_batch(state)
         )
 
     def _check_estimate(self, method: str, given: object, batch: int | None) -> PoseEstimate:
-        """Return an estimate as contiguous arrays.
+        """Check an estimate and return it with contiguous arrays.
 
         Args:
-            method: the method that returned it, for errors.
+            method: name of the method that returned it, for error messages.
             given: the estimate.
             batch: the expected number of environments; None if it is unknown.
 
         Raises:
-            ConfigError: it is no `PoseEstimate`, or one of its arrays is invalid.
+            ConfigError: `given` is not a `PoseEstimate`, or one of its arrays is invalid.
         """
         if not isinstance(given, PoseEstimate):
             raise ConfigError(
-                f"{self.name}: {method} must give a PoseEstimate, got {described(given)}."
+                f"{self.name}: {method} must give a PoseEstimate, got {describe(given)}."
             )
         n = len(given.mean_world) if batch is None else batch
         slots = (n, self.n_workers)
@@ -150,7 +150,7 @@ class CheckedEstimator(Generic[State]):
 
 
 def _find_batch(state: object) -> int | None:
-    """Return the length of the first axis of a state's arrays; None if it holds none."""
+    """Return the length of the first axis of a state's arrays, or None if it has no arrays."""
     if isinstance(state, np.ndarray):
         shape = cast(NDArray[Any], state).shape
         return shape[0] if shape else None

@@ -1,4 +1,4 @@
-"""Settings of the estimators: those that all of them share, and a class for each estimator."""
+"""Settings of the estimators: a base class of shared settings, and one class for each estimator."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -13,7 +13,7 @@ from hrc_env.core.mapping import answer_unknown_fields
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
-    """How every estimator starts, loses and reports tracks of workers.
+    """Settings shared by all estimators: how tracks of workers start, are lost and are reported.
 
     Positions are in the world frame, +Z up. Use `dataclasses.replace` for a copy with other values.
 
@@ -25,14 +25,14 @@ class TrackerConfig:
         "forget_s": "lost_relaxation_s",
         "longest_delay_s": "max_delay_s",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
-    """Position at which a worker is assumed before any measurement, x, y, z in the world frame [m].
-    The default is the centre of the working area."""
+    """Assumed position of a worker before any measurement, x, y, z in the world frame [m]. The
+    default is the centre of the working area."""
     prior_std_m: float = 1.5
-    """Standard deviation of the prior position on each axis [m]. No estimate is reported with a
-    larger one."""
+    """Standard deviation of the prior position on each axis [m]. Reported standard deviations do
+    not exceed it."""
     max_age_s: float = 5.0
     """Upper bound of the reported ages [s]."""
     lost_after_s: float = 1.0
@@ -40,21 +40,22 @@ class TrackerConfig:
     lost_relaxation_s: float = 2.0
     """Time constant with which the estimate of a lost worker relaxes to the prior [s]."""
     max_delay_s: float = 0.0
-    """Largest delay with which a frame is still used at its own time, `Keypoints.time_s`; in [0, 1]
-    [s]. With 0, every frame counts as taken at the update that brings it."""
+    """Largest delay with which a frame is still processed at the time at which it was taken,
+    `Keypoints.time_s`; in [0, 1] [s]. With 0, every frame is processed as if it had been taken when
+    it arrives."""
     acquire_min_joints: int = 6
     """Number of joints on which two cameras must agree to start a track."""
     body_radius_m: float = 1.3
-    """Largest distance of a joint from the middle of the body [m]. Joints beyond it are
+    """Largest distance of a joint from the centre of the body [m]. Joints beyond it are
     rejected."""
     conflict_frames: int = 3
-    """Number of successive updates in which two views agree on another place of a joint before the
-    joint is acquired anew."""
+    """Number of successive updates in which two views must agree on another position of a joint
+    before the joint is acquired anew."""
     gate_sigma: float = 5.0
     """Gate for the agreement of views, in standard deviations of the detector."""
     sigma_scale: float = 1.0
-    """Factor on the standard deviations that the detector reports. For an estimator that does not
-    learn the noise, 1.2 suits errors that persist for half a second."""
+    """Factor on the standard deviations that the detector reports. A factor of 1.2 suits estimators
+    that do not learn the noise if errors persist for half a second."""
     min_std_m: float = 0.005
     """Smallest standard deviation that is reported in any direction [m]."""
     root_acceleration: float = 3.0
@@ -83,7 +84,7 @@ class TrackerConfig:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ParticleConfig(TrackerConfig):
-    """Settings of the default estimator: discrete hypotheses, each with a Gaussian body.
+    """Settings of the default estimator, in which a few hypotheses each hold a Gaussian body.
 
     The estimator is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell,
     UAI 2000). Its mathematics, with the symbols of these settings, is in docs/tracking.md.
@@ -107,57 +108,57 @@ class ParticleConfig(TrackerConfig):
         "swap_begins": "swap_start_probability",
         "swap_ends": "swap_end_probability",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     noise_bounds: tuple[float, float] = (1.0, 6.0)
-    """Lower and upper bound of the factor on the detector's variance that is learnt for every
-    camera and joint. Errors that all views share do not show as disagreement between views, so a
-    lower bound of 1 is the careful choice. With equal bounds nothing is learnt and the factor is
-    that number."""
+    """Lower and upper bounds of the factor on the detector's variance that is learnt for every
+    camera and joint. A lower bound of 1 is conservative: errors that all views share cause no
+    disagreement between views and are not learnt. If both bounds are equal, the factor is fixed."""
     noise_tau_s: float = 4.0
-    """Time constant with which the factors on the noise are learnt and forgotten [s]."""
+    """Time constant with which the factors on the variance are learnt and forgotten [s]."""
     noise_correlation_s: float = 0.5
-    """Correlation time of the persistent part of the detector's errors [s]. For BlazePose it is
-    half a second."""
+    """Correlation time of the persistent part of the detector's errors [s]. The default suits
+    BlazePose."""
     noise_share: float = 0.9
     """Prior share of the variance that belongs to persistent errors, in [0, 1). The default suits
     BlazePose; use 0 for a detector whose errors are independent from image to image."""
     floor_std_m: float = 0.05
-    """Standard deviation of the pseudo-measurement that puts a joint found below the floor, z < 0,
-    back onto it [m]. With infinity no floor is assumed."""
+    """Standard deviation of the pseudo-measurement that returns a joint below the floor, z < 0, to
+    the floor [m]. With infinity, no floor is assumed."""
     bone_variation_scale: float = 1.5
-    """Factor on the variation of bone lengths. A detector's joints wander on the body, so that even
-    a rigid bone seems to change its length; use 1 for points that do not."""
+    """Factor on the variation of bone lengths. The default suits a detector of joints that shift on
+    the body, which makes even rigid bones seem to change in length; use 1 for fixed points."""
     gauss_newton_steps: int = 2
     """Number of Gauss-Newton steps in the search for the posterior mode. More than two make no
     measurable difference."""
     outlier_weight: float = 0.15
-    """Prior probability that a measurement is an outlier, uniform over the image."""
+    """Prior probability that a measurement is an outlier. Outliers are uniform over the image."""
     image_area_px: float = 1920.0 * 1080.0
-    """Area of an image [px^2]; the density of outliers is its inverse."""
+    """Area of an image [px^2]; its inverse is the probability density of an outlier."""
     damping: float = 0.5
-    """Damping ratio of the motion of a joint about its place on the body, in (0, 1)."""
+    """Damping ratio of the motion of a joint relative to the body, in (0, 1)."""
     mean_correction: float = 0.8
     """Share of Laplace's correction from the mode to the mean of the posterior that is applied.
-    With 0 the depth that one camera leaves open drifts towards the lens; 1 overshoots a little."""
+    With 0, the depth of a body seen by one camera drifts towards the lens; 1 overshoots a
+    little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of a worker seen by only one camera for a while."""
+    """Factor on the reported covariance of a worker seen by only one camera for several updates."""
     lying_inflation: float = 4.5
-    """Additional factor on the reported covariance of a lying body that only one camera sees,
-    because one camera infers depth from how people stand."""
+    """Additional factor on the reported covariance of a lying body seen by only one camera, because
+    the depth inferred from one view relies on an upright posture."""
     n_hypotheses: int = 8
-    """Maximum number of hypotheses about one worker. With 1 the estimator is a single Gaussian
+    """Maximum number of hypotheses about one worker. With 1, the estimator is a single Gaussian
     (estimator="kalman")."""
     one_view_wait_updates: int = 5
     """Number of updates to wait for a second view of a new person before a track is started from
     one view alone. A rig of one camera does not wait."""
     size_std: float = 0.06
-    """Relative standard deviation of people's size, as of adult statures. It sets the depth
-    uncertainty of a body that was started from one view."""
+    """Relative standard deviation of people's size; the default is that of adult statures. It
+    determines the depth uncertainty of a body that was started from one view."""
     initial_foot_height_std_m: float = 0.0
-    """Standard deviation of the height of the lowest joint above the floor, z = 0, assumed when one
-    view starts a body [m]. It measures the size of the body; 0.1 suits people on the floor. With 0,
-    people may be at any height."""
+    """Standard deviation of the height of the lowest joint above the floor, z = 0, assumed when a
+    body is started from one view [m]. This assumption determines the size of the body; 0.1 suits
+    people on the floor. With 0, people may be at any height."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """Parts that may be mirrored in depth while only one view shows them: "body", "limbs" or
     both."""
@@ -168,23 +169,23 @@ class ParticleConfig(TrackerConfig):
     hypotheses are searched for [m]. Below it, recent measurements of other views still fix the
     depth."""
     turn_std_rad: float = 0.7
-    """Standard deviation of the turn between a new hypothesis and a known one [rad]. A body turned
-    by this angle starts with e^-0.5 of the weight."""
+    """Standard deviation of the rotation between a new hypothesis and an existing one [rad]. A body
+    rotated by this angle starts with e^-0.5 of the weight."""
     evidence_exponent: float = 0.1
     """Exponent on the evidence of a set of frames when hypotheses are weighted, because model
     errors are correlated from frame to frame."""
     anatomy_exponent: float = 1.0
-    """Exponent on the anatomical prior when hypotheses are weighted: the places of nose, toes,
-    knees and elbows relative to the body."""
+    """Exponent on the anatomical prior when hypotheses are weighted. The prior concerns the
+    positions of nose, toes, knees and elbows relative to the body."""
     walking_log_odds_per_s: float = 2.0
-    """Log-odds per second that a hypothesis which walks forwards gains on one which does not
+    """Log-odds per second by which a hypothesis that walks forwards gains on one that does not
     [1/s]."""
     min_weight: float = 1e-3
     """Probability below which a hypothesis is dropped."""
     swap_start_probability: float = 0.01
-    """Probability per update that a camera starts to exchange left and right."""
+    """Probability per update that a camera starts to swap left and right labels."""
     swap_end_probability: float = 0.15
-    """Probability per update that a camera stops exchanging left and right."""
+    """Probability per update that a camera stops swapping left and right labels."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
@@ -243,7 +244,7 @@ class PaperConfig(TrackerConfig):
         **TrackerConfig.RENAMED,
         "place_m": "initial_bounds_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     velocity_tau_s: float = 0.2
     """Time constant of the low-pass filter on differenced velocities [s]."""
@@ -251,12 +252,12 @@ class PaperConfig(TrackerConfig):
     """Number of particles per joint, the paper's M."""
     sigma_m: float = 0.05
     """Standard deviation of the random walk per frame and axis, the paper's Sigma [m]. The paper
-    gives no number."""
+    does not state its value."""
     n_iterations: int = 1
     """Number of passes of Algorithm 1 over one set of frames, the paper's N."""
     initial_bounds_m: tuple[tuple[float, float], ...] = ()
     """Lower and upper bounds of x, y and z within which line 1 draws particles [m]. If empty, the
-    area that the cameras surround, from the floor to 2.2 m."""
+    particles are drawn in the area between the cameras, from the floor to 2.2 m."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
@@ -280,7 +281,7 @@ class PaperConfig(TrackerConfig):
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TriangulationConfig(TrackerConfig):
-    """Settings of triangulation, frame by frame.
+    """Settings of the estimators that triangulate each frame on its own.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
@@ -289,7 +290,7 @@ class TriangulationConfig(TrackerConfig):
     velocity_tau_s: float = 0.2
     """Time constant of the low-pass filter on differenced velocities [s]."""
     hold_speed_m_s: float = 1.0
-    """Speed at which the uncertainty of a held point grows during gaps [m/s]."""
+    """Growth rate of a joint's standard deviation while no frame shows the joint [m/s]."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
@@ -300,7 +301,10 @@ ConfigT = TypeVar("ConfigT", bound=TrackerConfig)
 
 
 def cast_config(config: TrackerConfig | None, kind: type[ConfigT]) -> ConfigT:
-    """Return settings of one kind: the given ones, or its defaults with the shared fields of those.
+    """Return settings of the class that an estimator takes.
+
+    Settings of that class are returned unchanged. From settings of another class, only the fields
+    of `TrackerConfig` are copied; the other fields have their defaults.
 
     Args:
         config: settings of any estimator; None for the defaults.

@@ -1,11 +1,12 @@
-"""Detected people that no track explains: wrong calibrations, exchanged or mirrored cameras.
+"""Detection of poses that no track explains, which reveal wrong calibrations.
 
 A camera contradicts a track if most of its confident detections are farther from the track's joints
-than the detector's errors. A single camera may do so for a moment after it has exchanged left and
-right, or while a track restarts. Several cameras that keep doing so are not placed as calibrated.
+than the detector's errors can explain. A single camera may do so briefly after it has swapped left
+and right labels, or while a track restarts. If several cameras do so persistently, they are not
+where their calibration says: they were moved, interchanged or mirrored.
 
-A track with a body that is far too small or too large explains no detection: with a
-calibration in other units, or by a board of another size, all cameras agree on such a body.
+A track with a body that is far too small or too large explains no detection. If the calibration
+used other units, or a board of another size, all cameras agree on such a body.
 """
 
 import math
@@ -22,23 +23,25 @@ from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays
 from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 SEEN_WELL = 0.5
-"""Least confidence of a detected joint that has to be explained."""
+"""Confidence from which a detected joint must be explained by a track."""
 LEAST_JOINTS = 4
-"""Least number of such joints in a pose that has to be explained."""
+"""Number of confident joints from which a pose must be explained by a track."""
 EXPLAINED_M = 0.15
 """Distance across the line of sight within which a detection fits a track's joint [m]."""
 SIGMAS = 4.0
-"""Distance within which a detection fits a track's joint, in its standard deviations."""
+"""Distance within which a detection fits a track's joint, in standard deviations of the
+detection."""
 SMALLEST_M = 0.95
-"""Length of trunk, thigh and shank of the smallest person [m]; of adults it is 1.15 to 1.55 m."""
+"""Total length of trunk, thigh and shank of the smallest person [m]. That of adults is 1.15 to
+1.55 m."""
 LARGEST_M = 1.8
-"""Length of trunk, thigh and shank of the largest person [m]."""
+"""Total length of trunk, thigh and shank of the largest person [m]."""
 CHAIN = tuple(JOINT[f"left_{name}"] for name in ("shoulder", "hip", "knee", "ankle"))
-"""Indices of the joints of the left side; each is followed by its counterpart on the right."""
+"""Indices of the left shoulder, hip, knee and ankle; the index of the right one is one higher."""
 
 
 class DetectedPoses(NamedTuple):
-    """The cameras that detect poses, and those that detect unexplained ones."""
+    """Masks of the cameras that detect poses, and of those that detect unexplained poses."""
 
     poses: Bools
     """(B, C) whether the camera detects a pose."""
@@ -49,11 +52,11 @@ class DetectedPoses(NamedTuple):
 def find_unexplained(
     keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate, P: Floats, focal_px: Floats
 ) -> DetectedPoses:
-    """Find the cameras that detect poses, and those that detect poses of no track.
+    """Find the cameras that detect poses, and those that detect poses that no track explains.
 
     Args:
         keypoints: (B, C, W, J) pinhole pixels, assigned to workers.
-        age_s: (B, C) age of each camera's image [s]; NaN without one.
+        age_s: (B, C) age of each camera's image [s]; NaN if it has none.
         estimate: (B, W, J) estimate of the tracker.
         P: (C, 3, 4) projections of the calibrated cameras.
         focal_px: (C,) focal lengths [px].
@@ -98,7 +101,7 @@ def _find_unexplained(
 
 @kernel
 def _measure_side(body: Points3) -> float:
-    """Return the length of trunk, thigh and shank of a body (J, 3), the mean of both sides [m]."""
+    """Return the length of trunk, thigh and shank of a body (J, 3), mean of left and right [m]."""
     total = 0.0
     for side in range(2):
         for k in range(3):

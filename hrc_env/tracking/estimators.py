@@ -1,15 +1,15 @@
-"""The estimators by name, their registration and their checks.
+"""Registry of the estimators by name, and checks of registered estimators.
 
 | name | estimator |
 |---|---|
-| `particle` | the default: discrete hypotheses, each with one Gaussian on the body |
-| `kalman` | the same with one hypothesis: a Gaussian on the kinematic tree |
-| `paper` | the paper's Algorithm 1 as printed, with particles that start all over the area |
-| `paper_restarts` | the same, with tracks that start, are repaired and end as the others' do |
-| `triangulation` | weighted least squares from all views, frame by frame; gaps are held |
-| `ransac` | the same from the views that agree |
+| `particle` | the default: several hypotheses about a body, each a Gaussian on the kinematic tree |
+| `kalman` | `particle` with one hypothesis |
+| `paper` | the paper's Algorithm 1 as printed; its particles start anywhere in the area |
+| `paper_restarts` | `paper` with tracks that are started, repaired and ended as in the others |
+| `triangulation` | weighted least squares from all views of a frame; gaps keep the last position |
+| `ransac` | `triangulation` from the views that agree |
 
-`smoother` is offline: `smoother.smooth` takes a whole clip (`OFFLINE`).
+`smoother` is offline: `smoother.smooth` processes a whole clip (`OFFLINE`).
 """
 
 from collections.abc import Callable, Sequence
@@ -18,9 +18,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from hrc_env.core.batching import copied, rows
-from hrc_env.core.brought import check_arguments, check_kind, described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.batching import copy_arrays, rows
+from hrc_env.core.brought import check_arguments, check_kind, describe
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
@@ -45,14 +45,14 @@ from hrc_env.tracking.triangulating import TriangulationEstimator
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class EstimatorSpec:
-    """An estimator with its name, its factory and its settings.
+    """Specification of an estimator: its name, its factory and its settings.
 
     `register_estimator` takes a spec. The argument `estimator` of an environment takes a spec, the
     name of a registered one, or a function like `make`.
     """
 
     name: str
-    """Name under which the estimator is registered and which errors mention."""
+    """Name under which the estimator is registered and by which error messages refer to it."""
     make: Callable[[Floats, float, Any], Estimator[Any]]
     """Function (P, ctrl_dt, config) that returns the estimator. Its arguments are the projections
     (C, 3, 4) from the world [m] to pixels, the time between updates [s], and settings of the class
@@ -60,20 +60,22 @@ class EstimatorSpec:
     config: type[TrackerConfig] = TrackerConfig
     """Class of the settings that `make` takes."""
     needs_pairs: bool = False
-    """Whether the estimator cannot use a single camera. It then also receives the last frames of
-    the other cameras with a frame that comes alone because it is late or of another rate."""
+    """Whether the estimator needs at least two cameras. If so, a frame that arrives alone, because
+    it is late or its camera has another rate, is accompanied by the last frames of the other
+    cameras."""
     handles_late_frames: bool = False
-    """Whether the estimator itself uses late frames at their own time. If so, `update` receives
-    frames as they arrive, once a control step, with their times in `Keypoints.time_s`. If not, the
-    package returns to an earlier state and repeats the later steps."""
+    """Whether the estimator itself processes late frames at the time at which they were taken. If
+    so, `update` receives frames as they arrive, once per control step, with their times in
+    `Keypoints.time_s`. If not, the package returns to an earlier state and repeats the later
+    steps."""
 
     @property
     def wants_pairs(self) -> str:
-        """The name if the estimator needs two cameras, else the empty string."""
+        """Name of the estimator if it needs two cameras, else the empty string."""
         return self.name if self.needs_pairs else ""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle a registered spec by its name, any other one by its fields."""
+        """Pickle a registered spec by its name, and any other spec by its fields."""
         if ESTIMATORS.get(self.name) is self:
             return find_estimator, (self.name,)
         return EstimatorSpec, tuple(getattr(self, each.name) for each in fields(self))
@@ -85,7 +87,7 @@ def _make_kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleE
 
 
 def _make_ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> TriangulationEstimator:
-    """Return triangulation from the views that agree."""
+    """Return the estimator that triangulates from the views that agree."""
     return TriangulationEstimator(P, ctrl_dt, config, config.gate_sigma)
 
 
@@ -105,20 +107,22 @@ ESTIMATORS = Registry(
         )
     },
 )
-"""Specs by name: those of this package, and those that were registered."""
+"""Specs of the built-in and the registered estimators, by name."""
 BUILT_IN = frozenset(ESTIMATORS.data.values())
-"""Specs of this package; the results of all others are checked (`checked.CheckedEstimator`)."""
+"""Specs of the built-in estimators; the results of all others are checked (`CheckedEstimator`)."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
-"""Offline estimators by name, with the functions that take a whole clip."""
+"""Calls that run the offline estimators on a whole clip, by the estimators' names."""
 EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
-"""A name in `ESTIMATORS`, a spec, or a function like `EstimatorSpec.make`."""
+"""Type of the argument `estimator`: a name in `ESTIMATORS`, a spec, or a function like
+`EstimatorSpec.make`."""
 
 
 def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
     """Return the spec of an estimator given by name, as a spec or as a function.
 
     Raises:
-        ConfigError: the name is unknown or `OFFLINE`, or the function takes other arguments.
+        ConfigError: the name is unknown or that of an `OFFLINE` estimator, or the function takes
+            other arguments.
     """
     if isinstance(estimator, EstimatorSpec):
         return estimator
@@ -129,14 +133,14 @@ def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
     if not isinstance(given, str):
         raise ConfigError(
             "estimator must be a name, an EstimatorSpec or a function of (P, ctrl_dt, config), got "
-            f"{described(estimator)}."
+            f"{describe(estimator)}."
         )
     if estimator in OFFLINE:
         raise ConfigError(
             f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
         )
     if estimator not in ESTIMATORS:
-        raise unknown("estimator", estimator, ESTIMATORS)
+        raise make_unknown_name_error("estimator", estimator, ESTIMATORS)
     return ESTIMATORS[estimator]
 
 
@@ -152,17 +156,18 @@ def make_estimator(
         estimator: a name in `ESTIMATORS`, an `EstimatorSpec`, or a function like its `make`.
         P: (C, 3, 4) projections from the world [m] to pixels.
         ctrl_dt: usual time between two updates [s].
-        config: settings; of those of another estimator, the shared fields are used. None for the
-            defaults.
+        config: settings of the estimator; None for the defaults. From settings of another
+            estimator, only the fields of `TrackerConfig` are used.
 
     Returns:
-        The estimator. The arguments and the estimates of one that is not built in are checked
-        (`checked.CheckedEstimator`). With `config.max_delay_s`, late frames are used at their
-        own time (`out_of_sequence.OutOfSequence`), unless the estimator handles them itself.
+        The estimator. If it is not built in, its methods and its estimates are checked
+        (`checked.CheckedEstimator`). If `config.max_delay_s` is positive, late frames are processed
+        at the time at which they were taken (`out_of_sequence.OutOfSequence`), unless the estimator
+        handles them itself.
 
     Raises:
-        ConfigError: the estimator is unknown or needs the future (`OFFLINE`), P has another shape
-            or is not finite, or `ctrl_dt` is not positive.
+        ConfigError: the estimator is unknown or `OFFLINE`, `P` has another shape or is not finite,
+            or `ctrl_dt` is not positive.
     """
     spec = find_estimator(estimator)
     cameras = np.ascontiguousarray(P, dtype=float)
@@ -183,13 +188,13 @@ def make_estimator(
 _DT_S = 0.04
 _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
                [[640.0, -900, 0, 0], [360, 0, -900, 0], [1, 0, 0, 3]]])  # fmt: skip
-"""(2, 3, 4) projections of two cameras that look at the origin, for checks."""
+"""(2, 3, 4) projections of two cameras that face the origin, for checks."""
 
 
 def check_estimator(spec: EstimatorSpec) -> None:
-    """Raise `ConfigError` for an estimator that is incomplete or returns invalid estimates.
+    """Raise `ConfigError` if an estimator is incomplete or returns invalid estimates.
 
-    The check includes workers that no camera sees: they must have an estimate, too.
+    Workers that no camera sees must have an estimate, too.
     """
     given = cast(object, spec)
     if not isinstance(given, EstimatorSpec):
@@ -226,7 +231,7 @@ _DEPENDS_ON_SELF = (
 
 
 def _check_independence(spec: EstimatorSpec) -> None:
-    """Raise `ConfigError` if environments depend on each other or on anything but their state."""
+    """Raise `ConfigError` if an environment's estimates depend on anything but its own state."""
     seeds = (0, 1)
     together = _track_people(spec, seeds)
     for row, seed in enumerate(seeds):
@@ -235,7 +240,7 @@ def _check_independence(spec: EstimatorSpec) -> None:
 
 
 def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimate]:
-    """Return six successive estimates of one standing person in each environment.
+    """Return six successive estimates of one motionless person in each environment.
 
     Args:
         spec: the estimator.
@@ -260,7 +265,7 @@ def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimat
 
     estimates: list[PoseEstimate] = []
     for k in range(6):
-        detected, before = detect(), (copied(state), copied(rngs))
+        detected, before = detect(), (copy_arrays(state), copy_arrays(rngs))
         made.predict(state, _DT_S, rngs)
         made.update(state, detected, rngs)
         estimates.append(made.estimate(state))
@@ -277,13 +282,13 @@ def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimat
 
 
 def _check_same(spec: EstimatorSpec, one: PoseEstimate, other: PoseEstimate, message: str) -> None:
-    """Raise `ConfigError` with a message unless two estimates are equal up to rounding.
+    """Raise `ConfigError` unless two estimates are equal up to rounding errors.
 
     Args:
-        spec: the estimator, which the error names.
+        spec: the estimator, for the error message.
         one: an estimate.
         other: an estimate that should be the same.
-        message: what is wrong otherwise.
+        message: explanation of the fault, for the error message.
     """
     for name in ("mean_world", "cov_world", "velocity_world", "age_s", "tracked"):
         x, y = (np.asarray(getattr(each, name), float) for each in (one, other))

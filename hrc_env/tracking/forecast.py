@@ -1,10 +1,10 @@
-"""Forecasts of the workers up to a second ahead, without further measurements.
+"""Forecasts of the workers up to one second ahead, without further measurements.
 
-A small network, trained by `assets/ahead/train.py` on the environment's own motions, takes one body
-in the frame of its heading. For a few horizons it predicts the displacement of each joint and the
-standard deviation of its error, which is added to the present uncertainty. A body of unknown
-heading moves with constant velocity and random acceleration; one that is not tracked relaxes to the
-prior (docs/tracking.md, "Forecast").
+A small network, trained by `assets/ahead/train.py` on the environment's motions, takes one body in
+the frame of its heading. For a few horizons, it predicts the displacement of each joint and the
+standard deviation of its error, which is added to the current uncertainty. A body of unknown
+heading moves with constant velocity and random acceleration; a body that is not tracked relaxes to
+the prior (docs/tracking.md, "Forecast").
 """
 
 import functools
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -26,41 +26,42 @@ from hrc_env.tracking.tree.evidence import Heading, find_heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
-"""Greatest horizon of a forecast [s]."""
+"""Longest horizon of a forecast [s]."""
 N_INPUTS = 7 * N_JOINTS + 4
 """Number of the network's inputs; see `describe`."""
 _N_OUTPUTS = 4 * N_JOINTS
-"""Number of the network's outputs for one horizon: displacements and log-deviations."""
+"""Number of the network's outputs for one horizon: displacements and logarithmic deviations."""
 _TORSO = (1, 2, 7, 8)
 """Indices of shoulders and hips."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
 class ForecastNetwork(NamedTuple):
-    """The network: two hidden layers of n and m rectified units, matrices (in, out) in float32."""
+    """Weights of a network with two hidden layers of n and m ReLU units, in float32."""
 
     horizons_s: Floats
-    """(H,) horizons that it was trained for, ascending [s]."""
+    """(H,) horizons for which the network was trained, in ascending order [s]."""
     weight_1: Tensor
-    """(N_INPUTS, n) first matrix; it contains the scales of the inputs (m, s, logarithms)."""
+    """(N_INPUTS, n) weights of the first hidden layer, which include the scaling of the inputs."""
     bias_1: Tensor
-    """(n,) first bias."""
+    """(n,) biases of the first hidden layer."""
     weight_2: Tensor
-    """(n, m) second matrix."""
+    """(n, m) weights of the second hidden layer."""
     bias_2: Tensor
-    """(m,) second bias."""
+    """(m,) biases of the second hidden layer."""
     weight_3: Tensor
-    """(H, m, 60) last matrix for each horizon: displacements (J, 3) in the body's frame [m], then
-    logarithms of standard deviations (J,) [m]."""
+    """(H, m, 60) weights of the output layer for each horizon. The outputs are the displacements
+    (J, 3) in the body's frame [m], followed by the logarithms of their standard deviations (J,)
+    [m]."""
     bias_3: Tensor
-    """(H, 60) last bias for each horizon."""
+    """(H, 60) biases of the output layer for each horizon."""
     log_std: Floats
-    """(2,) least and greatest logarithm of a joint's standard deviation in the training data
+    """(2,) smallest and largest logarithm of a joint's standard deviation in the training data
     [m]."""
 
 
 class Scratch(NamedTuple):
-    """Room for the layers of one body."""
+    """Activations of the network for one body."""
 
     inputs: Tensor
     """(N_INPUTS,) inputs."""
@@ -69,13 +70,13 @@ class Scratch(NamedTuple):
     second: Tensor
     """(m,) second hidden layer."""
     before: Tensor
-    """(60,) outputs for the trained horizon before the wanted one."""
+    """(60,) outputs for the last trained horizon before the requested one."""
     after: Tensor
-    """(60,) outputs for the trained horizon after it."""
+    """(60,) outputs for the first trained horizon from the requested one on."""
 
 
 class Motion(NamedTuple):
-    """The predicted motion of one body, in the frame of its heading."""
+    """The predicted motion of one body in the frame of its heading."""
 
     moved: Points3
     """(J, 3) displacements [m]."""
@@ -86,21 +87,21 @@ class Motion(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """The motion of bodies to which the network does not apply."""
+    """Parameters for the motion of bodies to which the network does not apply."""
 
     heading_m2: float
     """Variance added on each axis to a tracked body of unknown heading [m^2]."""
     keep: float
-    """Share of its deviation from the prior that a body without a track keeps."""
+    """Share of the deviation from the prior that a body without a track keeps."""
     prior_mean: tuple[float, float, float]
-    """Position of the prior [m]."""
+    """Mean of the prior position [m]."""
     prior_std: float
     """Standard deviation of the prior on each axis [m]."""
 
 
 @functools.cache
 def load_network() -> ForecastNetwork:
-    """Return the network that comes with the package."""
+    """Return the network that is shipped with the package."""
     with np.load(assets_dir() / "ahead" / "ahead.npz") as stored:
         return ForecastNetwork(
             *(np.ascontiguousarray(stored[name]) for name in ForecastNetwork._fields)
@@ -111,11 +112,11 @@ def load_network() -> ForecastNetwork:
 def describe(
     points: Points3, velocity: Velocities3, cov: Covariances3, log_std: Floats, out: Tensor
 ) -> Heading:
-    """Write the network's inputs for one body, and return its heading.
+    """Compute the network's inputs for one body and return its heading.
 
     The inputs are, in the frame of the heading (forward, left, up): the joints (J, 3) relative to
-    the middle of the torso and their velocities (J, 3) relative to the torso's; the torso's
-    velocity (3,) and height; and the logarithms of the joints' standard deviations (J,).
+    the centre of the torso, their velocities (J, 3) relative to that of the torso, the torso's
+    velocity (3,) and height, and the logarithms of the joints' standard deviations (J,).
 
     Args:
         points: (J, 3) joints in the world frame [m].
@@ -151,7 +152,7 @@ def describe(
 
 @kernel(makes_arrays=True, fastmath=_REORDER)
 def _apply_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
-    """Write out = bias + inputs weight, for a matrix (in, out)."""
+    """Compute a linear layer, out = bias + inputs @ weight."""
     for k in range(len(out)):
         out[k] = bias[k]
     for i in range(len(inputs)):
@@ -162,7 +163,7 @@ def _apply_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> N
 
 @kernel(makes_arrays=True)
 def _apply_hidden_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
-    """Write out = max(bias + inputs weight, 0)."""
+    """Compute a hidden layer, out = max(bias + inputs @ weight, 0)."""
     _apply_layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))
@@ -170,12 +171,12 @@ def _apply_hidden_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tenso
 
 @kernel(makes_arrays=True)
 def run_network(network: ForecastNetwork, horizon: float, scratch: Scratch, motion: Motion) -> None:
-    """Write the predicted motion at `horizon` [s], interpolated between the trained horizons.
+    """Predict the motion of a body, interpolated between the trained horizons.
 
     Args:
         network: the network.
         horizon: time ahead [s].
-        scratch: the inputs, of `describe`, and room for the layers.
+        scratch: activations, of which `describe` has filled in the inputs.
         motion: the motion, filled in.
     """
     second, before, after = scratch.second, scratch.before, scratch.after
@@ -202,7 +203,7 @@ def run_network(network: ForecastNetwork, horizon: float, scratch: Scratch, moti
 
 @kernel(makes_arrays=True)
 def make_scratch(network: ForecastNetwork) -> Scratch:
-    """Return room for the layers of one body."""
+    """Return empty arrays for the activations of one body."""
     return Scratch(
         inputs=np.empty(N_INPUTS, np.float32),
         first=np.empty(network.weight_1.shape[1], np.float32),
@@ -213,17 +214,17 @@ def make_scratch(network: ForecastNetwork) -> Scratch:
 
 
 def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
-    """Return the expected estimate after a while in which no camera sees the workers.
+    """Return the estimate expected after an interval without measurements.
 
     Args:
-        now: present estimate in the world frame; it is not changed.
+        now: current estimate in the world frame; it is not changed.
         horizon_s: time ahead, in (0, 1] [s].
-        config: settings of the estimator: the prior, to which a worker without a track relaxes, and
-            the bounds of what is reported.
+        config: settings of the estimator, with the prior, to which workers without a track relax,
+            and the bounds of the reported covariances.
 
     Returns:
-        New arrays of the shapes of `now`: means [m], velocities [m/s] and covariances [m^2] at that
-        time, and ages increased by the horizon. Tracked workers stay tracked.
+        New arrays with the shapes of `now`: means [m], velocities [m/s] and covariances [m^2] at
+        that time, and ages increased by the horizon. Tracked workers stay tracked.
 
     Raises:
         ConfigError: `horizon_s` is not in (0, 1].
@@ -231,7 +232,7 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
     age_s = np.minimum(now.age_s + horizon_s, config.max_age_s)
-    later = replace(mapped(now, lambda array: array.copy()), age_s=age_s)
+    later = replace(map_arrays(now, lambda array: array.copy()), age_s=age_s)
     workers = EstimateArrays(*(getattr(later, name) for name in EstimateArrays._fields))
     drift = Drift(
         heading_m2=config.root_acceleration * horizon_s**3 / 3,
@@ -247,12 +248,12 @@ def mix_hypotheses(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> Po
     """Return the moments of the mixture of several forecasts for each worker.
 
     Args:
-        later: (B, W H, J, ...) forecasts of the H hypotheses about each worker, side by side.
+        later: (B, W * H, J, ...) forecasts for the H hypotheses about each worker.
         log_weight: (B, W, H) log-probabilities of the hypotheses.
-        n_alive: (B, W) number of a worker's hypotheses that are in use, the heaviest first.
+        n_alive: (B, W) number of hypotheses in use about each worker; the heaviest is the first.
 
     Returns:
-        The estimate (B, W, J, ...), with ages and tracks of the heaviest hypothesis.
+        The estimate (B, W, J, ...), with `age_s` and `tracked` of the heaviest hypothesis.
     """
     alive = np.arange(log_weight.shape[2], dtype=np.int64) < n_alive[..., None]
     share = np.where(alive, np.exp(log_weight), 0.0)
@@ -283,7 +284,7 @@ def _move_workers(
 
     Args:
         network: the network.
-        workers: (B, W, ...) present estimate, changed in place except for its ages.
+        workers: (B, W, ...) current estimate, changed in place except for its ages.
         horizon: time ahead [s].
         drift: the motion of bodies to which the network does not apply.
     """
@@ -311,7 +312,7 @@ def _move_workers(
 def _apply_motion(
     mean: Points3, cov: Covariances3, velocity: Velocities3, heading: Heading, motion: Motion
 ) -> None:
-    """Apply a motion in the frame of the heading to a body in the world frame, in place.
+    """Apply a motion, given in the frame of the heading, to a body in the world frame, in place.
 
     Args:
         mean: (J, 3) joints [m].

@@ -1,48 +1,51 @@
-"""The last frames of every camera with their times, grouped into sets that were taken together."""
+"""Buffers of the last frames of every camera, and sets of frames that were taken together."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, write_rows
+from hrc_env.core.batching import map_arrays, write_rows
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 
 SAME_S = 5e-5
-"""Greatest difference of two times that count as the same [s]."""
+"""Largest difference between two times that count as equal [s]."""
 _TICK_S = 1e-4
-"""Resolution of times within a control step, so that equal latencies share a computation [s]."""
+"""Resolution of times within a control step [s]; environments with equal times share a
+computation."""
 _TOGETHER_TICKS = 20
-"""Greatest difference of the times of frames in one set: 2 ms, in which a walker moves 3 mm."""
+"""Largest difference in time between frames of one set, in ticks: 2 ms, in which a walking person
+moves 3 mm."""
 _END = 2**40
-"""Ticks of a frame that was taken at the end of its step."""
+"""Tick that stands for the end of the step."""
 _NEVER = 2**41
-"""Ticks of a frame that was not taken within the step."""
+"""Tick of a frame that was not taken within the step."""
 _HELD_S = 0.1
-"""Greatest age of a frame that may be held beside a newer one, where two views are needed [s]."""
+"""Largest age of a frame that is reused with a newer frame of another camera [s]."""
 _DRIFT_PX_S = 300.0
-"""Speed of a walker's pixels, which makes detections of a held frame less certain [px/s]."""
+"""Speed of a walking person in the image, by which detections in a reused frame become less certain
+[px/s]."""
 
 
 class Frames(NamedTuple):
-    """The last N frames of each camera of each environment, in rings that change in place."""
+    """The last N frames of each camera in each environment, in ring buffers changed in place."""
 
     keypoints: Keypoints
     """(B, C, N, W, J, ...) keypoints of the frames."""
     time_s: Floats
-    """(B, C, N) times at which they were taken [s]; NaN where there is no frame."""
+    """(B, C, N) times at which the frames were taken [s]; NaN where there is no frame."""
     n_taken: Ints
-    """(B, C) number of frames that were stored."""
+    """(B, C) number of frames stored since the reset."""
     newest_s: Floats
-    """(B, C) time of the newest frame [s]."""
+    """(B, C) time of the camera's newest frame [s]."""
     forgotten_s: Floats
     """(B,) time of the newest frame that was overwritten [s]."""
 
 
 class FrameSet(NamedTuple):
-    """The frames of one time in G environments."""
+    """Frames of several cameras taken at the same time, for G environments."""
 
     keypoints: Keypoints
     """(G, C, W, J, ...) keypoints; missing where a camera has no frame."""
@@ -53,7 +56,7 @@ class FrameSet(NamedTuple):
 
 
 class TimedFrameSet(NamedTuple):
-    """A set of frames with its place in the control step."""
+    """A set of frames with its time relative to the control step."""
 
     since_s: float
     """Time from the beginning of the step to the frames [s]."""
@@ -62,32 +65,32 @@ class TimedFrameSet(NamedTuple):
 
 
 class StepFrames(NamedTuple):
-    """The frames of one control step in environments with equal times."""
+    """The frames of one control step, for environments in which they have equal times."""
 
     members: Ints
-    """(M,) positions of these environments in the `ids` of `group_frames`."""
+    """(M,) positions of these environments in the argument `ids` of `group_frames`."""
     step_s: float
     """Length of the step [s]."""
     frame_sets: list[TimedFrameSet]
-    """The sets of frames in the order of time."""
+    """The sets of frames in chronological order."""
 
 
 class Span(NamedTuple):
-    """The ticks of one set of frames."""
+    """The interval of ticks that one set of frames covers."""
 
     first: int
-    """Ticks of its first frame."""
+    """Tick of the first frame."""
     last: int
-    """Ticks of its last frame."""
+    """Tick of the last frame."""
 
 
 def make_frames(batch: int, n_cameras: int, n_frames: int, n_workers: int) -> Frames:
-    """Return empty rings for the frames of every camera.
+    """Return empty ring buffers for the frames of every camera.
 
     Args:
         batch: number of environments B.
         n_cameras: number of cameras C.
-        n_frames: number of frames N that are kept of each camera.
+        n_frames: number of frames N stored for each camera.
         n_workers: number of workers W.
     """
     shape = (batch, n_cameras, n_frames, n_workers, N_JOINTS)
@@ -110,28 +113,28 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
     """Store some frames in place of the oldest ones.
 
     Args:
-        frames: the rings, changed in place.
-        keypoints: (B, C, W, J, ...) keypoints of one frame of each camera.
-        time_s: (B, C) times at which these were taken [s].
-        use: (B, C) the frames that are stored.
+        frames: the ring buffers, changed in place.
+        keypoints: (B, C, W, J, ...) keypoints of one frame from each camera.
+        time_s: (B, C) times at which the frames were taken [s].
+        use: (B, C) whether the frame is stored.
     """
     b, c = np.nonzero(use)
     n = frames.n_taken[b, c] % frames.time_s.shape[2]
     old_s = frames.time_s[b, c, n]
     np.maximum.at(frames.forgotten_s, b, np.where(np.isfinite(old_s), old_s, -np.inf))
-    write_rows(frames.keypoints, (b, c, n), mapped(keypoints, lambda array: array[b, c]))
+    write_rows(frames.keypoints, (b, c, n), map_arrays(keypoints, lambda array: array[b, c]))
     frames.time_s[b, c, n] = frames.newest_s[b, c] = time_s[b, c]
     frames.n_taken[b, c] += 1
 
 
 def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> Iterator[StepFrames]:
-    """Yield the frames of one control step, by groups of environments with equal times.
+    """Yield the frames of one control step for each group of environments with equal times.
 
     Args:
         frames: the stored frames.
         ids: (G,) indices of the environments.
-        end_s: (G,) times at which their steps ended [s].
-        step_s: (G,) lengths of their steps [s].
+        end_s: (G,) times at which the environments' steps ended [s].
+        step_s: (G,) lengths of the steps [s].
     """
     ticks = _count_ticks(frames.time_s[ids], end_s, step_s)
     times = np.sort(ticks.reshape(len(ids), -1), axis=1)
@@ -149,16 +152,17 @@ def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> It
 
 
 def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
-    """Return the keypoints of a set, with the last frames of the other cameras for some workers.
+    """Complete a set with the last frames of other cameras for some workers; return its keypoints.
 
-    Two views that are a little out of step locate a worker better than one view alone. The
-    detections of a held frame become less certain by the distance that a walker may have moved.
+    Two views that are slightly out of synchronisation locate a worker better than one view alone.
+    The standard deviations of detections in an older frame grow by the distance that a walking
+    person may have moved in the image.
 
     Args:
         frames: the stored frames.
         ids: (G,) indices of the environments.
         frame_set: the set of frames.
-        wanted: (G, W) the workers that need held frames.
+        wanted: (G, W) whether the worker needs the frames of other cameras.
     """
     age_s = frame_set.at_s[:, None, None] - frames.time_s[ids]
     recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~frame_set.has[:, :, None]
@@ -175,7 +179,7 @@ def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bool
 
 
 def drop_cameras(keypoints: Keypoints, missing: Bools) -> Keypoints:
-    """Return keypoints without the frames of cameras `missing` (B, C)."""
+    """Return keypoints in which those of cameras `missing` (B, C) are marked as missing."""
     gone = missing[:, :, None, None]
     return Keypoints(
         np.where(gone[..., None], np.nan, keypoints.px),
@@ -185,14 +189,14 @@ def drop_cameras(keypoints: Keypoints, missing: Bools) -> Keypoints:
 
 
 def has_detections(keypoints: Keypoints) -> Bools:
-    """Return (B, C) whether a camera's frame has any detection."""
+    """Return a mask (B, C) of the cameras with any detection in their frame."""
     return np.any(np.isfinite(keypoints.px[..., 0]) & (keypoints.confidence > 0), axis=(2, 3))
 
 
 def _count_ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
-    """Return (G, C, N) ticks from the beginning of the step to each frame.
+    """Return the ticks (G, C, N) from the beginning of the step to each frame.
 
-    They are `_END` at the end of the step and `_NEVER` outside of it.
+    Frames at the end of the step have `_END`, and frames outside of the step have `_NEVER`.
 
     Args:
         time_s: (G, C, N) times of the frames [s].
@@ -208,7 +212,7 @@ def _count_ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
 
 
 def _group_equal_rows(keys: Ints) -> Iterator[Ints]:
-    """Yield the indices of equal rows of `keys` (G, n), group by group."""
+    """Yield, for each group of equal rows of `keys` (G, n), the indices of its rows."""
     if (keys == keys[0]).all():
         yield np.arange(len(keys))
         return
@@ -219,7 +223,7 @@ def _group_equal_rows(keys: Ints) -> Iterator[Ints]:
 
 
 def _find_spans(times: Ints) -> list[Span]:
-    """Return the first and the last tick of each set in sorted ticks (n,)."""
+    """Group sorted ticks (n,) into sets, and return the first and the last tick of each set."""
     spans: list[Span] = []
     for tick in map(int, times[times < _NEVER]):
         if spans and tick - spans[-1].first <= _TOGETHER_TICKS:
@@ -230,16 +234,16 @@ def _find_spans(times: Ints) -> list[Span]:
 
 
 def _select_newest(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> FrameSet:
-    """Return the newest of some frames of each camera as a set.
+    """Return the newest of the given frames of each camera as a set.
 
     Args:
         frames: the stored frames.
         ids: (G,) indices of the environments.
-        among: (G, C, N) the frames to select from.
+        among: (G, C, N) whether the frame may be selected.
         at_s: (G,) time of the set [s].
     """
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)
     b, c = ids[:, None], np.arange(n.shape[1], dtype=np.int64)
-    keypoints = mapped(frames.keypoints, lambda array: array[b, c, n])
+    keypoints = map_arrays(frames.keypoints, lambda array: array[b, c, n])
     has = np.asarray(among.any(2))
     return FrameSet(keypoints if has.all() else drop_cameras(keypoints, ~has), has, at_s)

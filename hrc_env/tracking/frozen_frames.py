@@ -1,8 +1,9 @@
 """Detection of cameras with a frozen image.
 
 No live camera reports exactly the same keypoints twice, because people sway and sensors have noise.
-If the keypoints of a camera repeat bit for bit, it is ignored until several successive images are
-new. One new image is not enough: a crop that moves over a frozen image makes single new ones.
+If the keypoints of a camera repeat bit for bit, the camera is ignored until several successive
+images are new. One new image is not enough, because a crop window that moves over a frozen image
+also changes the keypoints.
 """
 
 import math
@@ -19,10 +20,10 @@ LEAST_NEW = 3
 
 
 class LastImage:
-    """The memory of the images of one camera of one environment."""
+    """Record of the last images of one camera in one environment."""
 
     total: float
-    """Checksum of the keypoints of the last image with any; 0 before the first."""
+    """Checksum of the keypoints in the last image that had keypoints; 0 before the first one."""
     n_new: int
     """Number of successive images that were new, up to `LEAST_NEW`."""
 
@@ -31,30 +32,30 @@ LAST_IMAGE = dtype_of(LastImage)
 
 
 def make_frozen(batch: int, n_cameras: int) -> Records2[LastImage]:
-    """Return the memory (B, C) of cameras, none of which is frozen."""
+    """Return initial records (B, C), in which no camera is frozen."""
     state = make_records(LastImage, (batch, n_cameras))
     forget_frozen(state, np.arange(batch))
     return state
 
 
 def forget_frozen(state: Records2[LastImage], ids: Ints) -> None:
-    """Reset the memory of environments `ids`: none of their cameras is frozen."""
+    """Reset the records of environments `ids`, so that none of their cameras is frozen."""
     state[ids] = (0.0, LEAST_NEW)
 
 
 def leave_out_frozen(state: Records2[LastImage], ids: Ints, keypoints: Keypoints) -> None:
-    """Mark the keypoints of frozen cameras as missing, in place, and update the memory.
+    """Mark the keypoints of frozen cameras as missing, and update the records, in place.
 
     Args:
-        state: (B, C) memory of the whole batch.
-        ids: (b,) indices of the environments that the keypoints belong to.
+        state: (B, C) records of the whole batch.
+        ids: (b,) indices of the environments to which the keypoints belong.
         keypoints: (b, C, W, J) keypoints. Cameras without a new image must report none.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 
 
 def find_live_cameras(state: Records2[LastImage], ids: Ints) -> Bools:
-    """Return (b, C) which cameras of environments `ids` are not known to be frozen."""
+    """Return a mask (b, C) of the cameras of environments `ids` that are not frozen."""
     return state["n_new"][ids] >= LEAST_NEW
 
 
@@ -62,7 +63,7 @@ def find_live_cameras(state: Records2[LastImage], ids: Ints) -> Bools:
 def _leave_out(
     state: Records2[LastImage], ids: Ints, px: Points2, confidence: Floats, sigma_px: Floats
 ) -> None:
-    """Update the memory and blank the keypoints of frozen cameras; see `leave_out_frozen`."""
+    """Mark the keypoints of frozen cameras as missing; see `leave_out_frozen`."""
     for row in range(len(ids)):
         for c in range(px.shape[1]):
             last, total = state[ids[row], c], 0.0

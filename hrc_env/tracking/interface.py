@@ -1,4 +1,4 @@
-"""The interface of an estimator: from keypoints of several cameras to estimates of workers."""
+"""Interface of the estimators, which turn keypoints of several cameras into poses of workers."""
 
 from typing import Protocol, TypeVar
 
@@ -10,19 +10,20 @@ State = TypeVar("State")
 
 
 class Estimator(Protocol[State]):
-    """Estimates of W workers in each of B environments from the keypoints of several cameras.
+    """Estimator of W workers in each of B environments from the keypoints of several cameras.
 
-    A control step is `predict` and then `update`. In between, the perception level "pixels" centres
-    the cameras' windows where `estimate` expects the workers. The state is an array, or a record of
-    arrays, with leading axes (B, W), changed in place; a copy of the arrays is a copy of the state.
-    Random numbers for environment b come from `rngs[b]` only, and the results of one environment
-    depend neither on the others nor on their number. Positions are in the world frame, +Z up, in
-    metres and seconds. Pixels are those of the projections, u to the right and v down.
+    In each control step, `predict` is called first and `update` second. Between these calls, the
+    perception level "pixels" centres the cameras' windows on the workers that `estimate` returns.
+    The state is an array, or a record of arrays, with leading axes (B, W), changed in place; a copy
+    of the arrays is a copy of the state. Random numbers for environment b come from `rngs[b]` only,
+    and the results of one environment depend neither on the others nor on their number. Positions
+    are in the world frame, +Z up; units are metres and seconds. Pixels are those of the
+    projections, u to the right and v down.
 
     The package handles late frames. It stores copies of the state at the end of every control step,
-    returns to the last one before the frame was taken, and calls `predict` and `update` again from
+    returns to the last copy before the frame was taken, and calls `predict` and `update` again from
     there. Therefore `predict` may be called for parts of a control step, and `update` is called
-    once for each moment at which frames were taken. An estimator may handle late frames itself
+    once for each time at which frames were taken. An estimator may handle late frames itself
     instead (`EstimatorSpec.handles_late_frames`).
     """
 
@@ -36,7 +37,7 @@ class Estimator(Protocol[State]):
 
         Args:
             batch: number of environments B.
-            n_workers: number of workers W in each.
+            n_workers: number of workers W in each environment.
         """
         ...
 
@@ -51,18 +52,22 @@ class Estimator(Protocol[State]):
         ...
 
     def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let time pass: move means, widen covariances and count ages up (Algorithm 1, line 7).
+        """Predict the state at a later time (Algorithm 1, line 7).
+
+        Means move, covariances grow and ages increase.
 
         Args:
             state: changed in place.
-            dt_s: time since the last call, above 0 [s]: a control step or, where cameras are late
-                or out of step, the part of one up to the next frame.
+            dt_s: time since the last call, above 0 [s]. It is a control step or, if cameras are
+                late or not synchronised, the part of a step up to the next frame.
             rngs: one generator for each environment of the batch.
         """
         ...
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Condition the state on one set of frames (lines 8 to 17); no keypoints raise an error.
+        """Condition the state on one set of frames (Algorithm 1, lines 8 to 17).
+
+        Implementations must accept all keypoints, however implausible, without an error.
 
         Args:
             state: changed in place.
@@ -75,9 +80,9 @@ class Estimator(Protocol[State]):
         ...
 
     def estimate(self, state: State) -> PoseEstimate:
-        """Return the present estimate, in new arrays."""
+        """Return the current estimate in new arrays."""
         ...
 
     def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s`, in (0, 1] [s]; the state is not changed."""
+        """Return the estimate expected after `horizon_s` in (0, 1] [s]; the state is unchanged."""
         ...

@@ -1,13 +1,14 @@
-"""Measurements of one worker in one set of frames, with left and right as each camera reports them.
+"""Measurements of one worker in one set of frames, and correction of swapped left and right labels.
 
-A detection is a measurement unless its pixel is not finite or absurdly far, its confidence is
-outside (0, 1], or its standard deviation is not finite and positive. Wrong but plausible pixels are
-left to the robust likelihoods.
+A detection is a measurement unless its pixel is not finite or far outside the image, its confidence
+is outside (0, 1], or its standard deviation is not finite and positive. Wrong but plausible pixels
+are left to the robust likelihoods.
 
-Cameras that exchange left and right are detected over the whole body by a hidden Markov model with
-two states per camera: detections as they are, or mirrored. A camera that sees the worker again
-after a while is trusted at first, because the body may have been tracked mirrored in depth in the
-meantime. So are several cameras that all seem to be wrong.
+Cameras with swapped left and right labels are detected by a hidden Markov model over all joints of
+the body. It has two states per camera: labels as reported, or swapped. A camera that sees the
+worker again after an interval is trusted for some updates, because the body may have been tracked
+mirrored in depth in the meantime. Likewise, several cameras are trusted if all of them seem to be
+swapped.
 """
 
 import math
@@ -32,21 +33,22 @@ _REORDER = {"reassoc", "contract", "nsz"}
 _MIRROR = tuple(int(j) for j in MIRROR)
 """Index of the same joint on the other side of the body."""
 _UNSEEN_UPDATES = 8
-"""Number of updates without the worker after which a camera that sees them again is trusted."""
+"""Number of updates without the worker after which a camera is trusted when the worker reappears.
+"""
 _TRUSTED_UPDATES = 5
-"""Number of updates for which such a camera is trusted."""
+"""Number of updates for which a camera is trusted after the worker has reappeared."""
 _ENOUGH = 3
-"""Number of cameras that seem swapped from which the body may have its sides exchanged instead."""
+"""Number of cameras with swapped labels from which the tracked body itself may be mirrored."""
 _AGAINST = 5.0
-"""Log-likelihood ratio of the other cameras against an exchange that still allows it."""
+"""Upper bound of the other cameras' log-likelihood ratio against a mirrored body."""
 _LEAST_CHANCE = 1e-3
-"""Least probability of either state of a camera."""
+"""Lower bound of the probability of either state of a camera."""
 _MOST_EVIDENCE = 50.0
-"""Greatest log-likelihood ratio of one frame, in either direction."""
+"""Upper bound of the absolute log-likelihood ratio of one frame."""
 
 
 class KeypointArrays(NamedTuple):
-    """The arrays of a `Keypoints` that estimators read, as compiled functions take them."""
+    """The arrays of `Keypoints` that estimators read, as a tuple for compiled functions."""
 
     px: Points2
     """(B, C, W, J, 2) pixels."""
@@ -59,7 +61,7 @@ class KeypointArrays(NamedTuple):
 def get_keypoint_arrays(
     keypoints: Keypoints, shape: tuple[int, int, int, int] | None = None
 ) -> KeypointArrays:
-    """Return the arrays of keypoints, made contiguous where they are not.
+    """Return the arrays of keypoints, copied where they are not contiguous.
 
     Args:
         keypoints: the keypoints.
@@ -80,15 +82,16 @@ def get_keypoint_arrays(
 
 
 class Frame(NamedTuple):
-    """The measurements of one worker by C cameras, with what an update computes from them.
+    """The measurements of one worker by C cameras, and work arrays for an update.
 
-    All arrays but `cameras` are filled in place.
+    All arrays except `cameras` are filled in place.
     """
 
     cameras: Records1[Camera]
-    """(C,) cameras as the rig is calibrated."""
+    """(C,) cameras as calibrated."""
     P: Floats
-    """(C, 3, 4) projections as the cameras are assumed to be placed; the third row is the axis."""
+    """(C, 3, 4) projections for the assumed poses of the cameras; the third row is the optical
+    axis."""
     z: Points2
     """(J, C, 2) pixels; 0 where there is no measurement."""
     sigma: Floats
@@ -96,13 +99,13 @@ class Frame(NamedTuple):
     ok: Bools
     """(J, C) whether there is a measurement."""
     belief: Floats
-    """(J, C) probability that the measurement is no outlier."""
+    """(J, C) probability that the measurement is an inlier."""
     views: Floats
-    """(C, N_VIEW, LANES) the measurements as `tree.search` reads them."""
+    """(C, N_VIEW, LANES) measurements in the layout that `tree.search` reads."""
     images: Floats
-    """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
+    """(C, N_IMAGE, LANES) images of the joints at the last linearisation by `tree.search`."""
     joint_views: Floats
-    """(C, 8) scratch of `tree.learning` for one joint."""
+    """(C, 8) work array of `tree.learning` for one joint."""
 
 
 class JointPixel(NamedTuple):
@@ -113,14 +116,14 @@ class JointPixel(NamedTuple):
     v: float
     """Row [px]."""
     depth: float
-    """Distance along the axis [m]; without meaning as a pixel at NEAREST_DEPTH_M or less."""
+    """Depth along the optical axis [m]; the pixel is invalid if it is at most `NEAREST_DEPTH_M`."""
     spread: float
-    """Mean variance of a coordinate of the pixel [px^2]."""
+    """Variance of the pixel, averaged over both coordinates [px^2]."""
 
 
 @kernel
 def is_measurement(u: float, v: float, confidence: float, sigma: float) -> bool:
-    """Return whether a detection is a measurement.
+    """Return whether a detection is valid as a measurement.
 
     Args:
         u: column of its pixel [px].
@@ -138,7 +141,7 @@ def is_measurement(u: float, v: float, confidence: float, sigma: float) -> bool:
 
 @kernel(makes_arrays=True)
 def make_frame(cameras: Records1[Camera]) -> Frame:
-    """Return room for the measurements of one worker by cameras (C,)."""
+    """Return empty arrays for the measurements of one worker by cameras (C,)."""
     n = len(cameras)
     return Frame(
         cameras=cameras,
@@ -164,7 +167,7 @@ def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, fr
         b: index of the environment.
         w: index of the worker.
         sigma_scale: factor on the standard deviations.
-        frame: room for the measurements.
+        frame: measurements of the worker, filled in.
     """
     px, confidence, sigma_px = measured.px, measured.confidence, measured.sigma_px
     z, sigma, ok = frame.z, frame.sigma, frame.ok
@@ -184,7 +187,7 @@ def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, fr
 
 @kernel(fastmath=_REORDER)
 def compute_pixel_variance(p: Floats, u: float, v: float, depth: float, cov: Floats) -> float:
-    """Return the mean variance of a coordinate of the pixel of an uncertain point [px^2].
+    """Return the pixel variance of an uncertain point, averaged over both coordinates [px^2].
 
     Args:
         p: (3, 4) projection of the camera.
@@ -254,23 +257,23 @@ def read_for_hypothesis(
     settings: Settings,
     frame: Frame,
 ) -> bool:
-    """Fill in the measurements of one worker as one hypothesis reads them.
+    """Fill in the measurements of one worker for one hypothesis.
 
-    The standard deviations are scaled by the noise that the hypothesis has learnt, and cameras that
-    exchange left and right are corrected.
+    The standard deviations are scaled by the noise that the hypothesis has learnt, and swapped left
+    and right labels are corrected.
 
     Args:
         tree: the body of the hypothesis.
-        views: (C,) its memory of each camera, updated in place.
-        noise: (J, C) its measurement noise.
+        views: (C,) state of each camera in the hypothesis, updated in place.
+        noise: (J, C) measurement noise that the hypothesis has learnt.
         measured: detections of all workers.
         b: index of the environment.
         w: index of the worker.
         settings: settings of the estimator.
-        frame: room for the measurements.
+        frame: measurements of the worker, filled in.
 
     Returns:
-        Whether the body is the mirrored one: it has its sides exchanged, not the cameras.
+        Whether the tracked body has left and right swapped, and not the cameras.
     """
     read_worker(measured, b, w, settings.sigma_scale, frame)
     scale_sigma(noise, frame.sigma)
@@ -279,7 +282,7 @@ def read_for_hypothesis(
 
 @kernel
 def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
-    """Multiply standard deviations (J, C) by the roots of the learnt factors (J, C), in place."""
+    """Multiply standard deviations (J, C) by the roots of the learnt variance factors, in place."""
     for j in range(len(sigma)):
         for c in range(sigma.shape[1]):
             sigma[j, c] *= math.sqrt(noise[j, c].factor)
@@ -287,17 +290,17 @@ def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
 
 @kernel
 def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settings) -> bool:
-    """Mirror the measurements of cameras that probably exchange left and right, in place.
+    """Correct the measurements of cameras with probably swapped labels, in place.
 
     Args:
         tree: the body of the hypothesis.
         frame: measurements of the worker.
-        views: (C,) memory of each camera, updated in place.
+        views: (C,) state of each camera, updated in place.
         settings: settings of the estimator.
 
     Returns:
-        Whether the body has its sides exchanged instead, because all of several cameras agree on
-        that.
+        Whether the tracked body has left and right swapped instead. This is assumed if several
+        cameras seem to be swapped and the other cameras do not contradict.
     """
     n_seeing, n_swapped, against = 0, 0, 0.0
     for c in range(len(views)):
@@ -334,13 +337,14 @@ def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settin
 
 @kernel
 def _weigh_swap(tree: Tree, frame: Frame, c: int, inlier_odds: float) -> float:
-    """Return the bounded log-likelihood ratio of an exchange of left and right by one camera.
+    """Return the bounded log-likelihood ratio for swapped labels in one camera.
 
     Args:
         tree: the body of the hypothesis.
         frame: measurements of the worker.
         c: index of the camera.
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel
+            variance [px^2].
     """
     camera, body, cov = frame.P[c], tree.body, tree.cov
     z, sigma, ok = frame.z, frame.sigma, frame.ok
@@ -367,14 +371,15 @@ def _weigh_swap(tree: Tree, frame: Frame, c: int, inlier_odds: float) -> float:
 def _compute_mixture_density(
     du: float, dv: float, sigma: float, spread: float, inlier_odds: float
 ) -> float:
-    """Return the density of a detection relative to an outlier's, up to a common factor.
+    """Return the likelihood of a detection relative to that of an outlier, up to a common factor.
 
     Args:
         du: residual of the column [px].
         dv: residual of the row [px].
         sigma: standard deviation of each coordinate [px].
         spread: variance of the predicted pixel [px^2].
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel
+            variance [px^2].
     """
     near = 1.0 / (sigma * sigma + spread)
     return 1.0 + inlier_odds * near * math.exp(-0.5 * (du * du + dv * dv) * near)
@@ -382,7 +387,7 @@ def _compute_mixture_density(
 
 @kernel
 def mirror(c: int, z: Points2, sigma: Floats, ok: Bools) -> None:
-    """Exchange left and right in the measurements of one camera, in place.
+    """Swap left and right in the measurements of one camera, in place.
 
     Args:
         c: index of the camera.

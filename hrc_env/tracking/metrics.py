@@ -1,6 +1,6 @@
-"""Errors of tracks against the true bodies, and how often tracks change from one worker to another.
+"""Tracking metrics: position errors, lost workers, identity switches and IDF1.
 
-All functions compare belief with truth, so only metrics and infos may use them.
+All functions compare the estimate with the ground truth; only metrics and infos may use them.
 """
 
 import math
@@ -16,19 +16,19 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.geometry.assignment import assign_rows
 
 SAME_M = 0.5
-"""Mean distance of joints within which a track follows a worker [m]: the gate that CLEAR MOT uses
+"""Mean distance of joints within which a track matches a worker [m]: the gate that CLEAR MOT uses
 for people (Bernardin and Stiefelhagen 2008, doi:10.1155/2008/246309)."""
 
 
 class Identity:
-    """The tracking history of one worker in an episode, and of the slot of the same number."""
+    """The tracking history of one worker, and of the slot with the same index, in an episode."""
 
     track: int
-    """Slot with which the worker was matched last; -1 before the first match."""
+    """Index of the slot with which the worker was matched last; -1 before the first match."""
     matched: bool
     """Whether the worker was matched in the last step."""
     switches: int
-    """Number of matches with another slot than the time before."""
+    """Number of matches with another slot than in the previous match."""
     counted: int
     """Number of steps in which the worker was present, plus those in which the slot had a track."""
 
@@ -37,18 +37,20 @@ IDENTITY = dtype_of(Identity)
 
 
 class TrackingError:
-    """The errors of one environment's step; NaN where there is nothing to compare."""
+    """The tracking errors of one environment in one step; NaN if there is nothing to compare."""
 
     mpjpe_m: float
-    """Mean error of tracks from the workers that they fit best [m]."""
+    """Mean joint position error of the tracks, each compared with the worker assigned to it in the
+    best assignment [m]."""
     mpjpe_by_identity_m: float
-    """Mean error of workers from the tracks with which they were matched last [m]."""
+    """Mean joint position error of the workers, each compared with the track with which it was
+    matched last [m]."""
     lost: float
     """1 if fewer workers are tracked than present, else 0."""
     id_switches: float
     """Number of identity switches of all workers since the episode began."""
     idf1: float
-    """IDF1 since the episode began."""
+    """IDF1 (identity F1 score) since the episode began."""
 
 
 TRACKING = dtype_of(TrackingError)
@@ -56,16 +58,16 @@ TRACKING = dtype_of(TrackingError)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identities:
-    """The matches of workers and tracks since the episodes began."""
+    """The matches between workers and tracks since the episodes began."""
 
     workers: Records2[Identity]
     """(B, W) history of each worker."""
     near: Ints
-    """(B, W, W) number of steps in which worker and track were within `SAME_M`."""
+    """(B, W, W) number of steps in which each worker and each track were within `SAME_M`."""
 
 
 def make_identities(batch: int, n_workers: int) -> Identities:
-    """Return the identities at the start of episodes: no worker is matched."""
+    """Return the identities at the start of episodes, when no worker has been matched."""
     workers = make_records(Identity, (batch, n_workers))
     workers["track"][:] = -1
     return Identities(workers, np.zeros((batch, n_workers, n_workers), np.int64))
@@ -74,15 +76,16 @@ def make_identities(batch: int, n_workers: int) -> Identities:
 def measure_errors(
     estimate: PoseEstimate, joints_world: Points3, present: Bools, identities: Identities
 ) -> Records1[TrackingError]:
-    """Compare tracks with the true bodies, and advance the identities by a step.
+    """Compare tracks with the true bodies, and advance the identities by one step.
 
-    A match of worker and track lasts while they are within `SAME_M`. Then as many of the others as
-    possible are matched within that distance, at the least sum of distances (CLEAR MOT). A worker
-    matched with another slot than the last time has switched, so an exchange of two workers counts
-    as two switches. IDF1 is 2 m / n. Here m is the number of steps in which workers and
-    tracks were within `SAME_M`, each worker with one slot for the whole episode, in the best
-    assignment; n is the number of steps of workers and of tracks together (Ristani et al. 2016,
-    doi:10.1007/978-3-319-48881-3_2).
+    A match between a worker and a track is kept while they are within `SAME_M`. As many of the
+    other workers and tracks as possible are matched within that distance, with the smallest sum of
+    distances (CLEAR MOT). A worker matched with another slot than before counts as an identity
+    switch; if two workers swap their slots, that is two switches. IDF1 is 2 m / n. For it, each
+    worker is assigned to one slot for the whole episode; m is the number of steps in which assigned
+    pairs were within `SAME_M`, in the assignment that maximises this number; n is the number of
+    steps in which workers were present plus the number of steps in which slots had tracks (Ristani
+    et al. 2016, doi:10.1007/978-3-319-48881-3_2).
 
     Args:
         estimate: (B, W, ...) tracks.
@@ -91,7 +94,7 @@ def measure_errors(
         identities: matches since the episodes began, changed in place.
 
     Returns:
-        (B,) errors of each environment.
+        Tracking errors (B,) of the environments.
     """
     errors = make_records(TrackingError, len(present))
     _measure_errors(
@@ -116,7 +119,7 @@ def _measure_errors(
     near: Ints,
     errors: Records1[TrackingError],
 ) -> None:
-    """Fill in the errors (B,); the other arguments are those of `measure_errors`."""
+    """Fill in `errors` (B,); the other arguments are those of `measure_errors`."""
     n = tracked.shape[1]
     off_m, cost, chosen = np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
     for b in range(len(tracked)):
@@ -143,9 +146,9 @@ def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> 
 
     Args:
         off_m: (W, W) distance of each worker from each track [m].
-        tracked: (W,) the slots that have a track.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        tracked: (W,) whether the slot has a track.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
     """
     count, total = 0, 0.0
     for k in range(len(tracked)):
@@ -161,23 +164,23 @@ def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> 
 
 @kernel
 def _match_workers(off_m: Floats, workers: Records1[Identity], cost: Floats, chosen: Ints) -> float:
-    """Keep matches within the gate and match the other workers with the other tracks.
+    """Keep the matches within the gate and match the other workers with the other tracks.
 
     Args:
-        off_m: (W, W) distance of each worker from each track [m]; infinite without either.
+        off_m: (W, W) distance of each worker from each track [m]; infinite if one is missing.
         workers: (W,) history of each worker, changed in place.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
 
     Returns:
-        The mean distance of workers from the tracks that they were matched with last [m]; NaN
-        without any.
+        The mean distance of workers from the tracks with which they were matched last [m]; NaN if
+        there are none.
     """
     count, total = 0, 0.0
     for w in range(len(workers)):
         worker = workers[w]
         for k in range(len(workers)):
-            cost[w, k] = off_m[w, k] if off_m[w, k] <= SAME_M else 1e3  # more than all within it
+            cost[w, k] = off_m[w, k] if off_m[w, k] <= SAME_M else 1e3  # exceeds sums within it
         if worker.matched and off_m[w, worker.track] <= SAME_M:
             cost[w, worker.track] = -1e6
     assign_rows(cost, chosen)
@@ -197,10 +200,10 @@ def _compute_idf1(near: Ints, workers: Records1[Identity], cost: Floats, chosen:
     """Return the IDF1 of an episode; NaN without workers and tracks.
 
     Args:
-        near: (W, W) number of steps in which worker and track were within `SAME_M`.
+        near: (W, W) number of steps in which each worker and each track were within `SAME_M`.
         workers: (W,) history of each worker.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
     """
     for w in range(len(workers)):
         for k in range(len(workers)):

@@ -1,8 +1,8 @@
-"""Estimates that no camera made: the truth itself, and the prior.
+"""Estimates without cameras: the ground truth and the prior.
 
-This is the one place where truth becomes belief (perception level `truth`, for teaching and for
-upper bounds). The prior is the estimate of the level `none`, and of every estimator before it has
-seen anything.
+This is the only module that turns ground truth into an estimate (perception level `truth`, for
+teaching and for upper bounds). The prior is the estimate at the level `none`, and that of every
+estimator before the first detection.
 """
 
 from dataclasses import replace
@@ -14,11 +14,11 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.tracks import copy_estimate, make_tracks
 
 ORACLE_STD_M = 1e-3
-"""Standard deviation that is reported with the truth [m]: small, and invertible."""
+"""Standard deviation reported with the truth [m]: small, but with invertible covariances."""
 
 
 def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
-    """Return the truth as an estimate with arrays (B, W, J, ...): tracked, and of age 0."""
+    """Return the truth as an estimate (B, W, J, ...) in which all workers are tracked at age 0."""
     shape = truth.joints_world.shape[:-1]
     return PoseEstimate(
         mean_world=truth.joints_world.copy(),
@@ -30,12 +30,12 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
 
 
 def estimate_absence(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
-    """Return the estimate where it is known that no person is present.
+    """Return the estimate for environments that are known to be without people.
 
     Args:
         batch: number of environments B.
-        n_workers: number of workers W in each.
-        config: the prior, which the arrays (B, W, J, ...) hold.
+        n_workers: number of workers W in each environment.
+        config: settings that contain the prior, which fills the arrays (B, W, J, ...).
     """
     known = np.zeros((batch, n_workers))
     return replace(estimate_prior(batch, n_workers, config), unknown=known > 0, unobserved_s=known)
@@ -46,7 +46,7 @@ def estimate_prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEst
 
     Args:
         batch: number of environments B.
-        n_workers: number of workers W in each.
-        config: the prior, which the arrays (B, W, J, ...) hold.
+        n_workers: number of workers W in each environment.
+        config: settings that contain the prior, which fills the arrays (B, W, J, ...).
     """
     return copy_estimate(make_tracks(batch, n_workers, config))

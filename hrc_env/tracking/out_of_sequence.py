@@ -1,13 +1,12 @@
-"""Late frames are used at their own time: a short memory of estimates, and replay.
+"""Wrapper of an estimator that processes late frames at the times at which they were taken.
 
 `OutOfSequence` wraps any estimator. It stores the state of the inner estimator at the end of every
-control step, and the frames of every camera with their times. When a frame arrives that was taken
-in the past, the state from before that frame is restored and the later steps are repeated with new
-random numbers, each step's prediction split at the exact times of its frames.
+control step, and the frames of every camera with their times. When a late frame arrives, the last
+state before that frame is restored, and the later steps are repeated with new random numbers. The
+prediction of each step is split at the exact times of its frames.
 
-Frames are ignored, and counted in `LateState.ignored`, if their time lies in the future, is too old
-for the memory, is not newer than a frame of the same camera that was used already, or is not
-finite.
+Frames are ignored, and counted in `LateState.ignored`, if their time lies in the future, is older
+than the stored states, is not newer than a used frame of the same camera, or is not finite.
 """
 
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, picked, rows, write_rows
+from hrc_env.core.batching import map_arrays, rows, select_streams, write_rows
 from hrc_env.core.errors import check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
@@ -37,56 +36,58 @@ from hrc_env.tracking.frame_sets import (
 from hrc_env.tracking.interface import Estimator, State
 
 IGNORED = ("no time", "future", "not newer", "too old")
-"""Reasons for which frames are ignored, in the order of the last axis of `LateState.ignored`."""
+"""Reasons for ignoring frames, in the order of the last axis of `LateState.ignored`."""
 _AHEAD_S = 1e-3
-"""Greatest time by which a frame may be ahead of the clock and still count as present [s]."""
+"""Time by which a frame may be ahead of the clock and still count as current [s]."""
 
 
 class LateState(NamedTuple, Generic[State]):
-    """The present and the past states of an estimator, and the frames between; changed in place.
+    """Current and past states of an estimator, and the frames between them; changed in place.
 
-    K slots form a ring, one for each control step. The state of the open slot is `now`.
+    The past states form a ring buffer of K slots, one for each control step. The state of the
+    current slot is `now`.
     """
 
     now: State
-    """State of the inner estimator at the clock's time."""
+    """State of the inner estimator at time `clock_s`."""
     clock_s: Floats
     """(B,) time since the reset [s]."""
     slot: Ints
-    """(B,) index of the open slot."""
+    """(B,) index of the current slot."""
     n_kept: Ints
-    """(B,) number of slots before it that hold a state."""
+    """(B,) number of slots before the current one that hold a state."""
     end_s: Floats
     """(B, K) time at which each step ended [s]."""
     step_s: Floats
     """(B, K) length of each step [s]."""
     kept: State
-    """States at the ends of the steps: arrays as in `now`, with axes (B, K, ...)."""
+    """States at the ends of the steps: the arrays of `now` with axes (B, K, ...)."""
     frames: Frames
-    """Frames that may be needed again."""
+    """Frames that may be processed again."""
     ignored: Ints
-    """(B, 4) number of frames that were ignored, by the reasons in `IGNORED`."""
+    """(B, 4) number of ignored frames for each of the reasons in `IGNORED`."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutOfSequence(Generic[State]):
-    """An estimator with a memory of `max_delay_s`; see `tracking.estimators.Estimator`.
+    """Wrapper that accepts late frames up to `max_delay_s`; see `tracking.estimators.Estimator`.
 
-    It stores a copy of the inner state for every control step of that time, which takes megabytes
-    for the estimator `paper`.
+    It stores a copy of the inner state for every control step within that time, which takes
+    megabytes for the estimator `paper`.
     """
 
     inner: Estimator[State]
-    """The estimator that is wrapped."""
+    """The wrapped estimator."""
     n_cameras: int
     """Number of cameras."""
     ctrl_dt: float
-    """Usual time between two predictions [s]. If they come more often, the memory is shorter."""
+    """Usual time between two predictions [s]. With more frequent predictions, the stored states
+    cover a shorter time."""
     max_delay_s: float
     """Age beyond which frames are ignored [s]."""
     needs_pairs: bool = False
-    """Whether the inner estimator cannot use a single camera. It then also receives the last frames
-    of the other cameras with a frame that comes alone."""
+    """Whether the inner estimator needs at least two cameras. If so, a frame that arrives alone is
+    accompanied by the last frames of the other cameras."""
 
     @property
     def config(self) -> TrackerConfig:
@@ -104,7 +105,7 @@ class OutOfSequence(Generic[State]):
             n_kept=np.zeros(batch, np.int64),
             end_s=np.zeros((batch, n_slots)),
             step_s=np.zeros((batch, n_slots)),
-            kept=mapped(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
+            kept=map_arrays(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
             frames=make_frames(batch, self.n_cameras, 2 * n_slots, n_workers),
             ignored=np.zeros((batch, len(IGNORED)), np.int64),
         )
@@ -117,7 +118,7 @@ class OutOfSequence(Generic[State]):
         forget_frames(state.frames, ids)
 
     def predict(self, state: LateState[State], dt_s: float, rngs: Rngs) -> None:
-        """Store the present state, open a new slot, and let `dt_s` seconds pass."""
+        """Store the current state, open a new slot, and predict the state after `dt_s` [s]."""
         every, n_slots = np.arange(len(state.clock_s)), state.end_s.shape[1]
         self._keep(state, every, 0)
         state.n_kept[:] = np.minimum(state.n_kept + 1, n_slots - 1)
@@ -128,7 +129,7 @@ class OutOfSequence(Generic[State]):
         self.inner.predict(state.now, dt_s, rngs)
 
     def update(self, state: LateState[State], keypoints: Keypoints, rngs: Rngs) -> None:
-        """Update with frames, each at its own time (`Keypoints.time_s`)."""
+        """Update the state with frames, each at the time at which it was taken."""
         batch, n_workers = len(state.clock_s), state.frames.keypoints.px.shape[3]
         shape = (batch, self.n_cameras, n_workers, N_JOINTS)
         check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
@@ -141,7 +142,7 @@ class OutOfSequence(Generic[State]):
         first_s = np.where(use, time_s, np.inf).min(1)
         late = first_s < state.clock_s - SAME_S
         seen_now = (state.frames.newest_s >= state.clock_s[:, None] - SAME_S).any(1)
-        late |= seen_now & use.any(1) & np.isfinite(ends_s[:, 0])  # one update, not two
+        late |= seen_now & use.any(1) & np.isfinite(ends_s[:, 0])  # repeat it as one update
         remember(state.frames, keypoints, time_s, use)
         back = np.where(late, 1 + (ends_s >= first_s[:, None] - SAME_S).sum(1), 0)
         self._use_present(state, keypoints, use & ~late[:, None], rngs)
@@ -155,22 +156,22 @@ class OutOfSequence(Generic[State]):
                 self._keep(state, ids, age - 1)
 
     def estimate(self, state: LateState[State]) -> PoseEstimate:
-        """Return the present estimate."""
+        """Return the current estimate."""
         return self.inner.estimate(state.now)
 
     def forecast(self, state: LateState[State], horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s` [s]; see `tracking.forecast`."""
+        """Return the estimate expected after `horizon_s` [s]; see `tracking.forecast`."""
         return self.inner.forecast(state.now, horizon_s)
 
     def _use_present(
         self, state: LateState[State], keypoints: Keypoints, use: Bools, rngs: Rngs
     ) -> None:
-        """Update with present frames; environments without one are not changed.
+        """Update the state with current frames; environments without one are not changed.
 
         Args:
             state: changed in place.
             keypoints: (B, C, W, J) keypoints.
-            use: (B, C) the frames to use.
+            use: (B, C) whether the frame is used.
             rngs: one generator for each environment of the batch.
         """
         if use.all():
@@ -181,35 +182,44 @@ class OutOfSequence(Generic[State]):
             return
         part, used = self._select_states(state, ids), use[ids]
         frame_set = FrameSet(drop_cameras(rows(keypoints, ids), ~used), used, state.clock_s[ids])
-        self._use_frames(part, state, ids, frame_set, picked(rngs, ids))
+        self._use_frames(part, state, ids, frame_set, select_streams(rngs, ids))
         self._write(state, ids, part)
 
     def _repeat_step(self, state: LateState[State], ids: Ints, age: int, rngs: Rngs) -> None:
-        """Predict and update through a past step again.
+        """Repeat a past control step with all of its frames, late ones included.
+
+        `state.now` goes from the beginning to the end of that step: it is predicted to the time of
+        each set of frames and updated with it, and is then predicted to the end of the step.
 
         Args:
-            state: changed in place.
-            ids: indices of the environments.
-            age: the step ended `age` - 1 slots before the open one.
-            rngs: one generator for each environment of the batch.
+            state: `now` of these environments is changed in place.
+            ids: (n,) indices of the environments.
+            age: 1 for the step that ends at the present time (the open slot), 2 for the step before
+                it, and so on.
+            rngs: one generator for each environment of the batch, which draw new random numbers.
         """
-        slot = (state.slot[ids] - age + 1) % state.end_s.shape[1]
-        ends_s, steps_s = state.end_s[ids, slot], state.step_s[ids, slot]
-        for members, step_s, frame_sets in group_frames(state.frames, ids, ends_s, steps_s):
-            group, done_s = ids[members], 0.0
-            part, streams = self._select_states(state, group), picked(rngs, group)
-            for at_s, frame_set in frame_sets:
-                self.inner.predict(part, at_s - done_s, streams)
-                self._use_frames(part, state, group, frame_set, streams)
-                done_s = at_s
-            if step_s > done_s:
-                self.inner.predict(part, step_s - done_s, streams)
-            self._write(state, group, part)
+        n_slots = state.end_s.shape[1]
+        slots = (state.slot[ids] - age + 1) % n_slots
+        end_s, lengths_s = state.end_s[ids, slots], state.step_s[ids, slots]
+        for members, length_s, frame_sets in group_frames(state.frames, ids, end_s, lengths_s):
+            group_ids = ids[members]  # environments with the same frame times
+            group_state = self._select_states(state, group_ids)
+            group_rngs = select_streams(rngs, group_ids)
+            reached_s = 0.0  # from the beginning of the step
+            for since_start_s, frame_set in frame_sets:
+                self.inner.predict(group_state, since_start_s - reached_s, group_rngs)
+                self._use_frames(group_state, state, group_ids, frame_set, group_rngs)
+                reached_s = since_start_s
+            if length_s > reached_s:
+                self.inner.predict(group_state, length_s - reached_s, group_rngs)
+            self._write(state, group_ids, group_state)
 
     def _use_frames(
         self, part: State, state: LateState[State], ids: Ints, frame_set: FrameSet, rngs: Rngs
     ) -> None:
-        """Update with a set of frames; held frames of other cameras help to start tracks.
+        """Update with a set of frames, and with the last frames of other cameras if needed.
+
+        These are added for workers without a track, or for all workers if `needs_pairs`.
 
         Args:
             part: states of the environments, changed in place.
@@ -227,34 +237,37 @@ class OutOfSequence(Generic[State]):
         self.inner.update(part, keypoints, rngs)
 
     def _select_states(self, state: LateState[State], ids: Ints) -> State:
-        """Return the present states of environments `ids`: copies, unless these are all."""
+        """Return the current states of environments `ids`, copied unless these are all of them."""
         return state.now if len(ids) == len(state.clock_s) else rows(state.now, ids)
 
     def _write(self, state: LateState[State], ids: Ints, part: State) -> None:
-        """Write the states of environments `ids` back, where they are copies."""
+        """Write the states of environments `ids` back if they are copies."""
         if part is not state.now:
             write_rows(state.now, ids, part)
 
     def _keep(self, state: LateState[State], ids: Ints, age: int) -> None:
-        """Store the present states of some environments in a slot.
+        """Store the current states of some environments in a slot.
 
         Args:
             state: changed in place.
             ids: indices of the environments.
-            age: number of slots before the open one.
+            age: number of slots from this slot to the current one.
         """
         slots = _find_slots(state, ids, age)
         write_rows(_flatten_slots(state.kept), slots, self._select_states(state, ids))
 
 
 def _snap_to_present(time_s: Floats, now_s: Floats) -> Floats:
-    """Return times (B, C), those that differ from the present by rounding set to it [s]."""
+    """Return times (B, C) in which those that almost equal the current time are set to it [s]."""
     near = (time_s > now_s - SAME_S) & (time_s < now_s + _AHEAD_S)
     return np.where(near, now_s, time_s)
 
 
 def _list_ends(state: LateState[Any]) -> Floats:
-    """Return (B, K - 1) ends of the steps 1, 2, ... slots back [s]; -inf if not restorable."""
+    """Return the ends (B, K - 1) of the steps 1, 2, ... slots ago [s].
+
+    Steps whose state cannot be restored have -inf.
+    """
     n_slots = state.end_s.shape[1]
     age = np.arange(1, n_slots, dtype=np.int64)
     every = np.arange(len(state.slot))[:, None]
@@ -271,14 +284,14 @@ def _select_usable(
     ends_s: Floats,
     max_delay_s: float,
 ) -> Bools:
-    """Return (B, C) the frames that can be used; count the others in `state.ignored`.
+    """Return a mask (B, C) of the usable frames; count the others in `state.ignored`.
 
     Args:
         state: the counts are changed in place.
         keypoints: (B, C, W, J) keypoints.
         time_s: (B, C) times of the frames [s].
-        ends_s: (B, K - 1) ends of the steps that can be restored [s].
-        max_delay_s: greatest age of a frame [s].
+        ends_s: (B, K - 1) ends of the steps, as `_list_ends` returns them [s].
+        max_delay_s: largest age of a frame [s].
     """
     now_s = state.clock_s[:, None]
     oldest_s = np.where(np.isfinite(ends_s), ends_s, now_s).min(1)[:, None]
@@ -299,12 +312,12 @@ def _select_usable(
 
 
 def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
-    """Return the rows of the flattened slots that hold past states.
+    """Return the rows of slots in the arrays of `_flatten_slots`.
 
     Args:
         state: the whole state.
         ids: indices of the environments.
-        age: number of slots before the open one.
+        age: number of slots from the slot to the current one.
     """
     n_slots = state.end_s.shape[1]
     return ids * n_slots + (state.slot[ids] - age) % n_slots
@@ -312,4 +325,4 @@ def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
 
 def _flatten_slots(kept: State) -> State:
     """Return views (B K, ...) of the arrays (B, K, ...) of a state."""
-    return mapped(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))
+    return map_arrays(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))

@@ -1,22 +1,24 @@
-"""The paper's Algorithm 1, EstimatePose(N, M, C), as printed, and nothing else.
+"""The paper's Algorithm 1, EstimatePose(N, M, C), exactly as printed.
 
-"Line" in a comment is a line of that listing. Where the listing leaves a choice, it is read as
-follows:
+In comments, "line" refers to a line of that listing. Where the listing is ambiguous, it is
+interpreted as follows:
 
-- Every joint has its own cloud of particles. Line 1 speaks of "the i-th joint", and one cloud for
-  all 45 coordinates does not work with any affordable number of particles.
-- Clouds start uniform over a volume (line 1, `find_place`) and never restart: a worker who comes
-  back elsewhere is reached by line 7 alone.
-- A step of the simulation is one pass of the loop of line 2. Line 7 happens in `predict`, lines 8
-  to 17 in `update`; more passes over the same frames (`n_iterations`) repeat both.
-- The likelihoods of the cameras are multiplied (line 13). That of one camera is a Gaussian of the
-  pixel distance with the detector's sigma, or 1 for a joint that the camera does not see.
+- Every joint has its own cloud of particles. Line 1 refers to "the i-th joint", and a single cloud
+  for all 45 coordinates does not work with any affordable number of particles.
+- Clouds start uniform over a volume (line 1, `find_place`) and never restart. If a worker reappears
+  elsewhere, only the random walk of line 7 can move the cloud there.
+- A step of the simulation is one pass of the loop in line 2. `predict` executes line 7, and
+  `update` executes lines 8 to 17; further passes over the same frames (`n_iterations`) repeat both.
+- The likelihoods of the cameras are multiplied (line 13). The likelihood of one camera is a
+  Gaussian of the pixel distance with the detector's sigma, or 1 if the camera does not see the
+  joint.
 - The estimate (line 19) is the mean and the covariance of the resampled cloud.
 
-The other fields of a report move no particle. A joint's age is the time since a detection was
-consistent with its cloud. A worker becomes `tracked` once `acquire_min_joints` joints have age 0,
-and stays so while one age is below `lost_after_s`. Velocities are filtered differences of the
-means, 0 before. `paper_restarts` adds the steps that the listing lacks.
+The other fields of the estimate do not affect the particles. A joint's age is the time since a
+detection was consistent with its cloud. A worker becomes `tracked` once `acquire_min_joints` joints
+have age 0, and stays so while any age is below `lost_after_s`. Velocities are filtered differences
+of the means, and 0 before a worker is tracked. `paper_restarts` adds the steps that the listing
+lacks.
 """
 
 import math
@@ -44,16 +46,17 @@ from hrc_env.tracking.tracks import Track, make_tracks, report_tracks, reset_tra
 from hrc_env.tracking.tree.update import count_conflict
 
 BEHIND = -1e12
-"""Log-likelihood of a particle behind the camera that saw the joint, so that it is chosen last."""
+"""Log-likelihood of a particle behind a camera that detected the joint; it all but excludes the
+particle."""
 HEIGHTS_M = (0.0, 2.2)
-"""Bounds of z of the first particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
+"""Bounds of z of the initial particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
 _NARROWEST_M = 1.0
-"""Least extent of the cameras along an axis that bounds the first particles [m]."""
+"""Minimum extent of the camera positions along an axis for bounding the initial particles [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaperState:
-    """The clouds of particles, and the tracks that are reported."""
+    """The clouds of particles and the reported tracks."""
 
     tracks: Records2[Track]
     """(B, W) tracks."""
@@ -75,7 +78,7 @@ class PaperEstimator:
     """Settings of the algorithm."""
 
     def init(self, batch: int, n_workers: int) -> PaperState:
-        """Return the state before any detection; `reset` draws new clouds."""
+        """Return the state before any detection, with clouds as after `reset`."""
         shape = (batch, n_workers, N_JOINTS, 3, self.config.n_particles)
         tracks = make_tracks(batch, n_workers, self.config)
         state = PaperState(tracks, np.zeros(shape), np.zeros(batch))
@@ -95,7 +98,7 @@ class PaperEstimator:
                 compute_moments(state.particles[b, w], mean[b, w], cov[b, w])
 
     def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
-        """Move the particles and count ages up (line 7)."""
+        """Move the particles (line 7) and increase the ages."""
         self.walk(state, np.ones_like(state.tracks["tracked"]), dt_s, rngs)
         age_s = state.tracks["age_s"]
         age_s[...] = np.minimum(age_s + dt_s, self.config.max_age_s)
@@ -113,21 +116,22 @@ class PaperEstimator:
         state.elapsed_s[:] = 0.0
 
     def estimate(self, state: PaperState) -> PoseEstimate:
-        """Return the present estimate (line 19)."""
+        """Return the current estimate (line 19)."""
         return report_tracks(state.tracks, self.config)
 
     def forecast(self, state: PaperState, horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s` [s]; see `tracking.forecast`."""
+        """Return the estimate expected after `horizon_s` [s]; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
     def walk(self, state: PaperState, moving: Bools, dt_s: float, rngs: Rngs) -> None:
         """Move the particles of some workers by a random walk (line 7).
 
-        The variance of the walk, by which the estimate's covariance grows, is proportional to time.
+        The covariance of the estimate grows by the variance of the walk, which is proportional to
+        time.
 
         Args:
             state: changed in place.
-            moving: (B, W) the workers to move.
+            moving: (B, W) whether the worker's particles are moved.
             dt_s: time that passes [s].
             rngs: (B,) one generator for each environment.
         """
@@ -153,7 +157,7 @@ class PaperEstimator:
         tracks, particles, config = state.tracks, state.particles[b, w], self.config
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
-                roll(particles, config.sigma_m, rng)  # line 7, of further passes
+                roll(particles, config.sigma_m, rng)  # line 7 of further passes
             waits = rng.standard_exponential((N_JOINTS, particles.shape[-1] + 1))
             weigh_and_resample(frame, particles, waits)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
@@ -169,10 +173,10 @@ class PaperEstimator:
 
 
 def find_place(P: Floats, config: PaperConfig) -> Floats:
-    """Return the bounds of x, y and z within which the first particles are drawn, (3, 2) [m].
+    """Return the bounds (3, 2) of x, y and z within which the initial particles are drawn [m].
 
-    They are those of the configuration, else those of the area that the cameras surround. Along an
-    axis on which the cameras do not, they are two standard deviations about the prior.
+    If the settings give no bounds, they are those of the cameras' positions. Along an axis on which
+    the cameras are too close to each other, they are two standard deviations about the prior mean.
 
     Args:
         P: (C, 3, 4) projections.
@@ -201,7 +205,7 @@ def weigh_and_resample(frame: Frame, particles: Points3, waits: Floats) -> None:
     n_particles = particles.shape[2]
     log_weights, weights = np.empty(n_particles), np.empty(n_particles)
     ancestors, before = np.empty(n_particles, np.int64), np.empty((3, n_particles))
-    for j in range(n_joints):  # each joint is a filter of its own
+    for j in range(n_joints):  # each joint has a separate filter
         log_weights[:] = 0.0  # line 8: W[m] = 0 (a logarithm)
         for c in range(n_cameras):  # line 9
             if ok[j, c]:
@@ -218,10 +222,10 @@ def weigh_and_resample(frame: Frame, particles: Points3, waits: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def count_support(tracks: Records2[Track], b: int, w: int, frame: Frame, gate_sigma: float) -> int:
-    """Count the joints of one worker that a view supports, and update ages and conflicts.
+    """Count the joints of one worker that any view supports, and update ages and conflicts.
 
     Args:
-        tracks: (B, W) tracks, of which ages and conflicts of one are changed in place.
+        tracks: (B, W) tracks; the ages and conflicts of the worker are changed in place.
         b: index of the environment.
         w: index of the worker.
         frame: detections of the worker.
@@ -296,7 +300,7 @@ def add_log_likelihood(
         v: row of the detected pixel [px].
         sigma: standard deviation of each coordinate [px].
         particles: (3, M) positions [m].
-        log_weights: (M,) log-weights, added to.
+        log_weights: (M,) log-weights, increased in place.
     """
     for m in range(particles.shape[1]):
         expected_u, expected_v, depth = pixel_of(
@@ -311,7 +315,7 @@ def add_log_likelihood(
 
 @kernel(makes_arrays=True)
 def normalise(log_weights: Floats, weights: Floats) -> None:
-    """Fill in the weights (M,) of log-weights (M,), scaled so that they sum to one."""
+    """Compute normalised `weights` (M,) from log-weights (M,)."""
     largest = log_weights.max()
     total = 0.0
     for m in range(len(log_weights)):
@@ -323,7 +327,7 @@ def normalise(log_weights: Floats, weights: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def draw_multinomial(weights: Floats, waits: Floats, ancestors: Ints) -> None:
-    """Draw M independent indices with given probabilities, sorted.
+    """Draw M independent indices with given probabilities, in ascending order.
 
     The normalised cumulative sums of M + 1 standard exponential variates are M sorted uniform
     variates (Devroye, Non-Uniform Random Variate Generation, V.3).

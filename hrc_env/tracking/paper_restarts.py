@@ -1,8 +1,9 @@
-"""Algorithm 1 with steps that its listing lacks: tracks start, are repaired and end as others do.
+"""Algorithm 1 with steps that its listing lacks, which start, repair and end tracks.
 
-A cloud starts around a triangulated point, which `tree.acquisition` finds. A joint restarts where
-two views have long agreed on another place. A worker that no detection supports is lost, and the
-estimate relaxes to the prior. Between these events the clouds are those of `paper`.
+A cloud starts around a triangulated point, which `tree.acquisition` finds. A joint restarts if two
+views have agreed on another position for `conflict_frames` updates. A worker that no detection
+supports is lost, and the estimate relaxes to the prior. Between these events, the clouds evolve as
+in `paper`.
 """
 
 from dataclasses import dataclass
@@ -20,22 +21,22 @@ from hrc_env.tracking.tree.acquisition import find_again, find_body
 
 @dataclass(frozen=True, slots=True)
 class PaperRestarts(PaperEstimator):
-    """Algorithm 1 with restarts for every worker; see `tracking.estimators.Estimator`."""
+    """Algorithm 1 with restarts, for every worker; see `tracking.estimators.Estimator`."""
 
     def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
-        """Reset environments `ids` to the prior, without random numbers."""
+        """Reset environments `ids` to the prior; `rngs` is not used."""
         reset_tracks(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
 
     def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
-        """Move the particles of tracked workers (line 7), count ages up and end tracks."""
+        """Move the particles of tracked workers (line 7), increase ages and end tracks."""
         self.walk(state, state.tracks["tracked"], dt_s, rngs)
         age_tracks(state.tracks, dt_s, self.config)
 
     def apply_frame(
         self, state: PaperState, b: int, w: int, frame: Frame, rng: np.random.Generator
     ) -> None:
-        """Update one worker by one set of frames: lines 2 to 19 with restarts, or a new track.
+        """Update one worker by one set of frames, or start a track if the worker has none.
 
         Args:
             state: changed in place.

@@ -1,10 +1,11 @@
-"""The default estimator: a particle filter with hypotheses as particles, each a Gaussian body.
+"""The default estimator: a particle filter with hypotheses about Gaussian bodies as particles.
 
 It is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell, UAI 2000). The
-particles represent discrete facts, such as whether the body or a limb is mirrored in depth; all
-else is a Gaussian on the kinematic tree (`tree.state`). One particle suffices while the views
-agree. When one view is left, other modes are searched for, weighted by Laplace's evidence, merged
-and dropped, until the views decide (docs/tracking.md).
+particles represent discrete variables, such as whether the body or a limb is mirrored in depth; the
+continuous state is a Gaussian on the kinematic tree (`tree.state`). One particle suffices while the
+views agree. When only one view remains, the estimator searches for other modes, weights them by
+Laplace's evidence, and merges and drops them until the views resolve the ambiguity
+(docs/tracking.md).
 """
 
 from dataclasses import dataclass, field
@@ -41,7 +42,7 @@ class ParticleEstimator:
     cameras: Records1[Camera] = field(init=False, repr=False)
     """(C,) cameras of the projections `P`."""
     settings: Settings = field(init=False, repr=False)
-    """Settings in the form that compiled functions take."""
+    """Settings as a named tuple, for compiled functions."""
     noise_model: NoiseModel = field(init=False, repr=False)
     """Constants for learning the measurement noise."""
 
@@ -52,27 +53,27 @@ class ParticleEstimator:
         object.__setattr__(self, "noise_model", make_noise_model(self.config, self.ctrl_dt))
 
     def init(self, batch: int, n_workers: int) -> Hypotheses:
-        """Return one hypothesis at the prior for every worker."""
+        """Return a state with one hypothesis at the prior for every worker."""
         return make_hypotheses(batch, n_workers, len(self.P), self.config)
 
     def reset(self, state: Hypotheses, ids: Ints, rngs: Rngs) -> None:
-        """Reset environments `ids` to the prior, without random numbers."""
+        """Reset environments `ids` to the prior; `rngs` is not used."""
         reset_hypotheses(state, ids, self.config)
 
     def predict(self, state: Hypotheses, dt_s: float, rngs: Rngs) -> None:
-        """Move every hypothesis by its motion model, without random numbers."""
+        """Move every hypothesis by its motion model; `rngs` is not used."""
         model = make_motion_model(dt_s, self.config.damping, self.config.root_acceleration)
         predict_all(state, model, dt_s, self.settings, make_records(Work, 1))
 
     def update(self, state: Hypotheses, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Condition every hypothesis on one set of frames, without random numbers."""
+        """Condition every hypothesis on one set of frames; `rngs` is not used."""
         batch, n_workers = state.n_alive.shape
         measured = get_keypoint_arrays(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         work, prior = make_records(Work, 1), make_records(Tree, 1)
         update_all(state, self.cameras, measured, self.settings, self.noise_model, work, prior)
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
-        """Return the moments of the mixture, with the ages of the heaviest hypothesis."""
+        """Return the moments of the mixture of hypotheses, with the ages of the heaviest one."""
         tracked = np.empty(state.n_alive.shape, np.bool_)
         age_s = np.empty((*tracked.shape, N_JOINTS))
         mean, velocity = np.empty((2, *age_s.shape, 3))
@@ -81,7 +82,7 @@ class ParticleEstimator:
         return self._widen(state, PoseEstimate(*out))
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s` [s], the mixture of all hypotheses'."""
+        """Return the estimate expected after `horizon_s` [s], a mixture over all hypotheses."""
         batch, n_workers, n = state.trees.shape
         fields = (state.trees[name] for name in ("body", "cov", "age_s", "tracked"))
         shape = batch, n_workers * n
@@ -98,10 +99,11 @@ class ParticleEstimator:
         return self._widen(state, mixture)
 
     def _widen(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
-        """Widen covariances, in place, for unknown sizes and for misaligned cameras; return them.
+        """Widen covariances for unknown body sizes and misaligned cameras; return the estimate.
 
-        A worker with a track started from one view may be larger and farther from that camera by
-        the same share. A worker seen by two misaligned cameras may be displaced as a whole.
+        A worker with a track started from one view may be larger and, by the same factor,
+        farther from that camera. A worker seen by two misaligned cameras may be displaced as a
+        whole.
 
         Args:
             state: the hypotheses.

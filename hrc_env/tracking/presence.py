@@ -1,20 +1,22 @@
-"""Presence of people without a track: a slot without a track is not yet an empty one.
+"""Presence of people in workers' slots without a track.
 
-Absence is a statement about pieces of floor on which cameras would detect a person (`Coverage`). It
-rests on searches of whole images, one by a camera at a time. For a worker's slot without a track,
-each piece is
+Absence is inferred for patches of floor on which cameras would detect a person (`Coverage`). It
+relies on searches of whole images by the cameras. For a worker's slot without a track, each patch
+has one of three states:
 
-- `EMPTY`: at least `LEAST_CAMERAS` cameras that see it have searched their images often enough in
-  succession without finding an untracked person, and at least that many still do;
-- `PROBABLY_EMPTY`: at least one camera that sees it has, in `SEVERAL` searches. A single camera
-  proves no more: some 2 % of workers start out hidden from it;
-- `POSSIBLE`: there were too few searches, the cameras that see the piece give no images or frozen
-  ones, no camera sees it, or a camera shows an untracked person.
+- `EMPTY`: at least `LEAST_CAMERAS` cameras that see the patch have searched their images often
+  enough in succession without finding an untracked person, and at least as many cameras still find
+  none.
+- `PROBABLY_EMPTY`: at least one camera that sees the patch has found no untracked person in
+  `SEVERAL` searches. A single camera proves no more, because about 2 % of workers are hidden from
+  it at first.
+- `POSSIBLE`: there were too few searches, the cameras that see the patch provide no images or
+  frozen ones, no camera sees the patch, or a camera shows an untracked person.
 
-The slot is *absent* if every piece is empty, else *unknown*. A lost worker may be hidden at the
-last estimated place. Therefore no piece becomes empty until the worker is tracked again, or until
-that estimate is forgotten (after `FORGOTTEN` time constants `lost_relaxation_s` without a
-measurement) and searches find no person. A search is forgotten like a track, after `lost_after_s`.
+The slot is *absent* if every patch is empty, and *unknown* otherwise. A lost worker may be hidden
+at the last estimated position. Therefore no patch becomes empty until the worker is tracked again,
+or until that estimate is forgotten (after `FORGOTTEN` time constants `lost_relaxation_s` without a
+measurement) and searches find no person. A search expires after `lost_after_s`, as a track does.
 """
 
 from dataclasses import dataclass, replace
@@ -41,22 +43,23 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import DetectedPoses
 
 LEAST_CAMERAS = 2
-"""Least number of cameras that prove absence by their searches."""
+"""Minimum number of cameras that must search to prove absence."""
 IMAGES = 8
-"""Number of searches by all cameras together that prove absence where every image is processed
-whole; a part of the rig needs its share. Each of 2,000 workers was found in the first images of
-four cameras."""
+"""Number of searches by all cameras together that prove absence if every image is searched whole; a
+subset of the cameras needs a proportional number. Each of 2,000 workers was found in the first
+images of four cameras."""
 SEARCHES = 24
-"""The same where whole images are searched now and then. The first two searches missed one worker
-of 180, and six found 400 of 400 (tests/properties guarantees 90 %)."""
+"""Number of searches that prove absence, as for `IMAGES`, if whole images are searched only
+occasionally. The first two searches missed one worker of 180, and six found 400 of 400
+(tests/properties guarantees 90 %)."""
 SEVERAL = 3
-"""Number of searches by one camera after which floor is probably empty."""
+"""Number of searches without a person after which a patch of floor is probably empty."""
 FORGOTTEN = 3.0
-"""Time without a measurement after which the place of a lost worker is forgotten, as a multiple of
-`lost_relaxation_s`."""
+"""Time without a measurement after which the position of a lost worker is forgotten, as a multiple
+of `lost_relaxation_s`."""
 REPEATED = 2
-"""Number of successive images with an unexplained person before it counts; the detector
-occasionally takes the robot for a person."""
+"""Number of successive images that must show an unexplained person, because the detector
+occasionally mistakes the robot for a person."""
 CONTRADICTED = 6
 """Number of successive images with an unexplained person, in several cameras, that contradict the
 calibration."""
@@ -65,28 +68,28 @@ AGREED = 25
 
 
 class Slot:
-    """The presence of one worker."""
+    """Presence of a person in one worker's slot."""
 
     absent: bool
-    """Whether it is known that no person is there."""
+    """Whether it is known that the slot has no person."""
     lost: bool
-    """Whether the slot had a track, which was lost."""
+    """Whether the slot has or had a track whose position is not forgotten."""
     unobserved_s: float
-    """Time since the cameras last observed the worker, or that the floor is empty [s]."""
+    """Time since the cameras last saw the worker, or last found the floor empty [s]."""
     seen_world: Annotated[Points3, (N_JOINTS, 3)]
-    """Estimated joints when a camera last saw the worker [m]; NaN if none has."""
+    """Estimated joints when a camera last saw the worker [m]; NaN if no camera has."""
 
 
 SLOT = dtype_of(Slot)
 
 
 class SearchCount:
-    """The searches of one camera for one slot."""
+    """Record of the searches by one camera for one slot."""
 
     empty: int
     """Number of successive searches that found no person for the slot."""
     since_s: float
-    """Age of the image in which the last of these searched [s]."""
+    """Age of the image of the last of these searches [s]."""
 
 
 SEARCH_COUNT = dtype_of(SearchCount)
@@ -98,17 +101,17 @@ class PresenceArrays(NamedTuple):
     slots: Records2[Slot]
     """(B, W) presence of each worker."""
     searches: Records3[SearchCount]
-    """(B, W, C) searches of each camera for each slot."""
+    """(B, W, C) searches by each camera for each slot."""
     levels: Ints
-    """(B, W, G) `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY` for each group of floor."""
+    """(B, W, G) `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY` for each group of patches of floor."""
     age_s: Floats
-    """(B, W) age of the oldest search behind the levels [s]."""
+    """(B, W) age of the oldest search on which the levels are based [s]."""
     cameras: Bools
-    """(G, C) the cameras that see each group of floor; not changed."""
+    """(G, C) whether the camera sees the group of patches; not changed."""
 
 
 class Evidence(NamedTuple):
-    """The tracks and the searches of one update of `b` environments."""
+    """The tracks and the searches in one update of `b` environments."""
 
     tracked: Bools
     """(b, W) whether the worker is tracked."""
@@ -121,7 +124,7 @@ class Evidence(NamedTuple):
     assigned: Floats
     """(b, C, W, J) confidence of the detections after association."""
     has_strangers: Bools
-    """(b,) whether there is a person beyond the slots."""
+    """(b,) whether there may be a person without a slot."""
     searched: Bools
     """(b, C) whether the camera searched its whole image."""
     image_age_s: Floats
@@ -131,16 +134,16 @@ class Evidence(NamedTuple):
     dt_s: float
     """Time since the last update [s]."""
     lost_after_s: float
-    """Time after which a search is forgotten [s]."""
+    """Time after which a search expires [s]."""
     forgotten_s: float
-    """Time after which the place of a lost worker is forgotten [s]."""
+    """Time after which the position of a lost worker is forgotten [s]."""
 
 
 class PresenceReport(NamedTuple):
     """The fields of a `PoseEstimate` that an update of presence fills in."""
 
     unknown: Bools
-    """(b, W) whether a person without a track may be there."""
+    """(b, W) whether the slot may have a person without a track."""
     unobserved_s: Floats
     """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
     seen_world: Points3
@@ -148,17 +151,17 @@ class PresenceReport(NamedTuple):
 
 
 class FloorState(NamedTuple):
-    """The state of a group of floor for one slot."""
+    """The state of a group of patches of floor for one slot."""
 
     level: int
     """`POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
     age_s: float
-    """Age of the search behind it [s]; 0 if possible."""
+    """Age of the search on which `level` is based [s]; 0 for `POSSIBLE`."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImageSearches:
-    """The searches of whole images in one update."""
+    """The searches of whole images in one update of B environments."""
 
     whole: Bools
     """(B, C) whether a camera searched its whole image."""
@@ -167,9 +170,9 @@ class ImageSearches:
     enough: int
     """Number of searches that prove absence: `IMAGES` or `SEARCHES`."""
     shown: DetectedPoses
-    """Cameras that detect poses, and those that detect unexplained ones."""
+    """Masks of the cameras that detect poses, and of those that detect unexplained poses."""
     others: Others
-    """Detected people beyond the slots."""
+    """Detected people without a slot."""
 
 
 class Presence(Stateful):
@@ -178,7 +181,7 @@ class Presence(Stateful):
     Args:
         batch: number of environments B.
         n_workers: number of slots W in each.
-        coverage: the cameras that see each piece of floor.
+        coverage: the patches of floor, and the cameras that see each of them.
     """
 
     CHANGES = ("slots", "searches", "levels", "age_s", "strangers", "doubt", "others")
@@ -188,17 +191,17 @@ class Presence(Stateful):
         self.slots = make_records(Slot, (batch, n_workers))
         """(B, W) presence of each worker."""
         self.searches = make_records(SearchCount, (batch, n_workers, cameras.shape[1]))
-        """(B, W, C) searches of each camera for each slot."""
+        """(B, W, C) searches by each camera for each slot."""
         self.levels = np.zeros((batch, n_workers, len(cameras)), np.int64)
-        """(B, W, G) state of each group of floor for each slot."""
+        """(B, W, G) state of each group of patches of floor for each slot."""
         self.age_s = np.zeros((batch, n_workers))
-        """(B, W) age of the oldest search behind `levels` [s]."""
+        """(B, W) age of the oldest search on which `levels` is based [s]."""
         self.strangers = np.zeros((batch, cameras.shape[1]), np.int64)
         """(B, C) number of successive images in which a camera showed an unexplained person."""
         self.doubt = np.zeros(batch, np.int64)
-        """(B,) number of updates for which no track will be trusted."""
+        """(B,) number of further updates for which no track is trusted."""
         self.others = no_others(batch)
-        """The detected people beyond the slots."""
+        """Detected people without a slot."""
         self.forget(np.arange(batch))
 
     def forget(self, ids: Ints) -> None:
@@ -214,10 +217,10 @@ class Presence(Stateful):
         return Vacancy(self.coverage, self.levels[ids], self.age_s[ids], others)
 
     def find_contradicting_cameras(self, ids: Ints) -> Bools:
-        """Return (b, C) the cameras of environments `ids` that contradict the calibration.
+        """Return a mask (b, C) of cameras in environments `ids` that contradict the calibration.
 
-        Several cameras contradict it once they have shown an unexplained person in `CONTRADICTED`
-        successive images.
+        Cameras do so if at least `LEAST_CAMERAS` of them have shown an unexplained person in
+        `CONTRADICTED` successive images.
         """
         often = self.strangers[ids] >= CONTRADICTED
         return often & (often.sum(1, keepdims=True) >= LEAST_CAMERAS)
@@ -232,20 +235,20 @@ class Presence(Stateful):
         dt_s: float,
         config: TrackerConfig,
     ) -> PoseEstimate:
-        """Advance environments `ids` by one update.
+        """Update the presence of people in environments `ids`.
 
         Args:
-            ids: (b,) indices of the environments, the rows of the other arguments.
+            ids: (b,) indices of the environments, to which the rows of the other arguments belong.
             estimate: (b, W, ...) estimate of the tracker.
             found: (b, C, W, ...) detections before association with workers.
             assigned: (b, C, W, ...) detections after association with workers.
             searches: the searches of whole images.
             dt_s: time since the last update [s].
-            config: times after which tracks are lost and forgotten.
+            config: settings that contain `lost_after_s` and `lost_relaxation_s`.
 
         Returns:
-            The estimate with `unknown`, `unobserved_s` and `seen_world`; contradicted tracks are
-            not `tracked`.
+            The estimate with `unknown`, `unobserved_s` and `seen_world`. While the cameras
+            contradict the calibration, no worker is `tracked`.
         """
         strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
         strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])
@@ -289,7 +292,7 @@ class Presence(Stateful):
 def _update_slots(
     state: PresenceArrays, ids: Ints, evidence: Evidence, report: PresenceReport
 ) -> None:
-    """Advance the slots of environments `ids`, the rows of `evidence` and `report`."""
+    """Update the slots of environments `ids` from the rows of `evidence`, and fill in `report`."""
     tracked, age_s = evidence.tracked, evidence.age_s
     for row in range(len(ids)):
         for w in range(tracked.shape[1]):
@@ -302,7 +305,7 @@ def _update_slots(
                 slot.lost, slot.absent, slot.unobserved_s = True, False, age_s[row, w]
                 level[:] = POSSIBLE
             else:
-                if evidence.has_strangers[row]:  # the last estimated place need not be theirs
+                if evidence.has_strangers[row]:  # the last position may be another person's
                     _forget_place(slot)
                 state.age_s[ids[row], w] = _judge_floor(
                     slot, search, level, state.cameras, shown, evidence
@@ -317,9 +320,9 @@ def _update_slots(
 
 @kernel
 def _count_searches(search: Records1[SearchCount], row: int, w: int, evidence: Evidence) -> bool:
-    """Count the searches for one slot, and return whether a camera shows a person for it.
+    """Count the searches for one slot, and return whether a camera shows a person for the slot.
 
-    Such a person is the slot's worker, or one more than there are tracks.
+    A camera does so if it detects the slot's worker, or more people than there are tracks.
 
     Args:
         search: (C,) searches for the slot, changed in place.
@@ -356,14 +359,14 @@ def _judge_floor(
 
     Args:
         slot: the slot.
-        search: (C,) searches for it.
-        level: (G,) state of each group of floor, changed in place.
-        cameras: (G, C) the cameras that see each group.
+        search: (C,) searches for the slot.
+        level: (G,) state of each group of patches of floor, changed in place.
+        cameras: (G, C) whether the camera sees the group.
         shown: whether a camera shows a person for the slot.
-        evidence: times and the number of searches that prove absence.
+        evidence: the tracks and the searches of the update.
 
     Returns:
-        The age of the oldest search that found floor empty [s]; 0 if none did.
+        The age of the oldest search that found any floor empty [s]; 0 if no search did.
     """
     slot.unobserved_s += evidence.dt_s
     hides = slot.lost and slot.unobserved_s < evidence.forgotten_s
@@ -384,12 +387,12 @@ def _judge_floor(
 def _judge_group(
     search: Records1[SearchCount], sees: Bools, level: int, enough: int, shown: bool, hides: bool
 ) -> FloorState:
-    """Return the state of one group of floor for a slot without a track.
+    """Return the state of one group of patches of floor for a slot without a track.
 
     Args:
         search: (C,) searches for the slot.
-        sees: (C,) the cameras that see the group.
-        level: present state of the group.
+        sees: (C,) whether the camera sees the group.
+        level: current state of the group.
         enough: number of searches by all cameras that prove absence.
         shown: whether a camera shows a person for the slot.
         hides: whether a lost worker may still be hidden.
@@ -412,7 +415,7 @@ def _judge_group(
 
 @kernel
 def _copy_points(points: Points3, out: Points3) -> None:
-    """Copy joints (J, 3)."""
+    """Copy joints `points` (J, 3) to `out` (J, 3)."""
     for j in range(N_JOINTS):
         for i in range(3):
             out[j, i] = points[j, i]
@@ -420,7 +423,7 @@ def _copy_points(points: Points3, out: Points3) -> None:
 
 @kernel
 def _forget_place(slot: Slot) -> None:
-    """Forget that the slot had a track, and where."""
+    """Forget the lost track of a slot and its last position, in place."""
     slot.lost = False
     for j in range(N_JOINTS):
         for i in range(3):
@@ -429,7 +432,7 @@ def _forget_place(slot: Slot) -> None:
 
 @kernel
 def _is_shown(confidence: Floats) -> bool:
-    """Return whether any joint (J,) is detected."""
+    """Return whether any joint has a positive confidence (J,)."""
     most = 0.0
     for value in confidence:
         most = max(most, value)

@@ -1,4 +1,4 @@
-"""The settings of the estimators in the form that compiled functions take."""
+"""Settings of the estimators as a named tuple, which compiled functions accept."""
 
 import math
 from typing import Any, NamedTuple
@@ -6,44 +6,44 @@ from typing import Any, NamedTuple
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 
 _TICK_S = 1e-6
-"""Tolerance for sums of time steps: a period counts as over when it is short by no more [s]."""
+"""Tolerance for rounding errors in sums of time steps: a period may be shorter by this much [s]."""
 
 
 class Settings(NamedTuple):
-    """The fields of `ParticleConfig` that compiled functions read, and what follows from them."""
+    """The fields of `ParticleConfig` that compiled functions read, and values derived from them."""
 
     sigma_scale: float
     """Factor on the standard deviations that the detector reports."""
     gate_sigma: float
     """Gate for the agreement of views, in standard deviations of the detector."""
     body_radius_m: float
-    """Largest distance of a joint from the middle of the body [m]."""
+    """Largest distance of a joint from the centre of the body [m]."""
     acquire_min_joints: int
     """Number of joints on which two cameras must agree to start a track."""
     conflict_frames: int
-    """Number of successive updates in which two views disagree with a joint before it is acquired
+    """Number of successive updates in which two views must contradict a joint before it is acquired
     anew."""
     one_view_wait_updates: int
-    """Number of updates to wait for a second view before one view starts a track."""
+    """Number of updates to wait for a second view before a track is started from one view."""
     size_std: float
     """Relative standard deviation of people's size."""
     initial_foot_height_std_m: float
     """Standard deviation of the height of the lowest joint of a body started from one view [m]; 0
     if people may be at any height."""
     inlier_odds: float
-    """Odds of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
+    """Odds that a measurement without residual is an inlier, times its pixel variance [px^2]."""
     swap_start_probability: float
-    """Probability per update that a camera starts to exchange left and right."""
+    """Probability per update that a camera starts to swap left and right labels."""
     swap_end_probability: float
-    """Probability per update that a camera stops exchanging left and right."""
+    """Probability per update that a camera stops swapping left and right labels."""
     gauss_newton_steps: int
     """Number of Gauss-Newton steps in the search for the posterior mode."""
     prior_mean_world: tuple[float, float, float]
-    """Position of the prior, x, y, z in the world frame [m]."""
+    """Mean of the prior position, x, y, z in the world frame [m]."""
     prior_std_m: float
     """Standard deviation of the prior position on each axis [m]."""
     max_age_s: float
-    """Upper bound of the ages [s]."""
+    """Upper bound of the reported ages [s]."""
     lost_after_s: float
     """Time without a measurement of any joint after which a track is lost [s]."""
     lost_relaxation_s: float
@@ -61,21 +61,21 @@ class Settings(NamedTuple):
     bone_variation_scale: float
     """Factor on the variation of bone lengths."""
     mirrors_body: bool
-    """Whether hypotheses may turn a whole body the other way."""
+    """Whether hypotheses may mirror the whole body in depth."""
     mirrors_limbs: bool
-    """Whether hypotheses may reflect a limb in depth."""
+    """Whether hypotheses may mirror a limb in depth."""
     hypothesis_search_period_s: float
-    """Time between two searches for alternative hypotheses, short by a tolerance [s]."""
+    """Time between two searches for alternative hypotheses, less a tolerance [s]."""
     min_ambiguous_depth_std_m: float
     """Smallest standard deviation of a part's depth at which hypotheses are searched for [m]."""
     turn_std_rad: float
-    """Standard deviation of the turn between a new hypothesis and a known one [rad]."""
+    """Standard deviation of the rotation between a new hypothesis and an existing one [rad]."""
     evidence_exponent: float
     """Exponent on the evidence of a set of frames when hypotheses are weighted."""
     anatomy_exponent: float
     """Exponent on the anatomical prior when hypotheses are weighted."""
     walking_log_odds_per_s: float
-    """Log-odds per second that a hypothesis gains by walking forwards [1/s]."""
+    """Log-odds per second that a hypothesis gains if its body walks forwards [1/s]."""
     log_min_weight: float
     """Log-probability below which a hypothesis is dropped."""
 
@@ -83,7 +83,8 @@ class Settings(NamedTuple):
 def make_settings(config: TrackerConfig) -> Settings:
     """Return the settings for compiled functions.
 
-    Other estimators than the default one contribute the fields that all of them share.
+    From the settings of other estimators than the default one, only the fields of `TrackerConfig`
+    are taken; all other values are those of the default `ParticleConfig`.
     """
     config = cast_config(config, ParticleConfig)
     weight, area_px = config.outlier_weight, config.image_area_px

@@ -1,18 +1,18 @@
-"""Smoothing of a whole clip after the fact, as an upper bound for estimators.
+"""Offline smoothing of a whole clip, as an upper bound for estimators.
 
-The filter on the kinematic tree runs through the clip with one hypothesis. Then a
-Rauch-Tung-Striebel pass (AIAA Journal 3, 1965) runs backwards over its linear motion, on all 90
-coordinates of a body at once. With x and P the mean and the covariance of the filter at t, F and Q
-the motion to t + 1, and x- and P- = F P F' + Q the prediction:
+The filter on the kinematic tree runs through the clip with one hypothesis. A Rauch-Tung-Striebel
+pass (AIAA Journal 3, 1965) then runs backwards with the linear motion model, on all 90 coordinates
+of a body at once. With the filter's mean x and covariance P at time t, the motion F and Q to t + 1,
+and the prediction x- and P- = F P F' + Q:
 
     G = P F' (P-)^-1,   x_s = x + G (x_s' - x-),   P_s = P + G (P_s' - P-) G'.
 
-Nothing is carried back across the start of a track. No such pass corrects a body that one camera
-has mirrored in depth. Therefore the clip is also processed in reverse, and the result is the
-mixture of both directions, weighted by the certainty of their filters.
+Nothing is propagated back across the start of a track. A backward pass cannot correct a body that
+was tracked mirrored in depth from one view. Therefore the clip is also processed in reverse, and
+the result is the mixture of both directions, weighted by the certainty of their filters.
 
-The smoother needs the future, so it is no estimator of an environment. It is offline, in plain
-NumPy.
+The smoother needs future frames and therefore cannot be the estimator of an environment. It is
+implemented in plain NumPy.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS, TORSO
@@ -38,7 +38,7 @@ _N = 6 * N_JOINTS
 
 
 class Moments(NamedTuple):
-    """The means and covariances of n Gaussians of d coordinates."""
+    """The means and covariances of n Gaussians in d dimensions."""
 
     mean: Floats
     """(n, d) means."""
@@ -47,16 +47,16 @@ class Moments(NamedTuple):
 
 
 class LinearMotion(NamedTuple):
-    """The motion of a body over one step: x' = F x + constant + noise of covariance Q."""
+    """The motion of a body over one step: x' = F x + constant + noise with covariance Q."""
 
     F: Floats
-    """(90, 90) transition."""
+    """(90, 90) transition matrix."""
     Q: Floats
     """(90, 90) covariance of the noise."""
 
 
 class _FilteredFrame(NamedTuple):
-    """The state of the filter in a frame of n = B W workers."""
+    """The state of the filter at one frame, for n = B W workers."""
 
     predicted: Floats
     """(n, 90) means before the frame."""
@@ -65,19 +65,19 @@ class _FilteredFrame(NamedTuple):
     cov: Floats
     """(n, J, 6, 6) marginal covariances of the joints after the frame."""
     slope: Floats
-    """(n, J, 6, 6) slopes of the joints on their parents after the frame."""
+    """(n, J, 6, 6) slopes of the joints on their parents after the frame; see `tree.gaussian`."""
     displaced_m2: Floats
-    """(n, 3, 3) covariance of a displacement of the whole body [m^2]."""
+    """(n, 3, 3) covariance of the displacement of the whole body [m^2]."""
     age_s: Floats
     """(n, J) ages of the joints [s]."""
     tracked: Bools
     """(n,) whether the worker is tracked."""
     follows: Bools
-    """(n,) whether the track continues that of the frame before."""
+    """(n,) whether the track continues from the previous frame."""
 
 
 class _Smoothed(NamedTuple):
-    """The result of one direction for T frames of n workers, in the order of the clip."""
+    """The result of one direction for T frames and n workers, in the order of the clip."""
 
     mean: Floats
     """(T, n, J, 6) positions [m] and velocities [m/s]."""
@@ -94,18 +94,19 @@ class _Smoothed(NamedTuple):
 def smooth(
     P: Floats, clip: Sequence[Keypoints], dt_s: float, config: TrackerConfig | None = None
 ) -> PoseEstimate:
-    """Return the estimate of every frame, given the whole clip.
+    """Return the estimate for every frame, given the whole clip.
 
     Args:
         P: (C, 3, 4) projections from the world [m] to pixels.
-        clip: keypoints of T frames, each (B, C, W, J, ...), in the order of time; their `time_s` is
-            ignored.
+        clip: keypoints of T frames, each (B, C, W, J, ...), in chronological order; their `time_s`
+            is ignored.
         dt_s: time between two frames [s].
         config: settings of the estimator "kalman"; None for the defaults.
 
     Returns:
-        Arrays (T, B, W, ...). A worker tracked in neither direction is where the forward filter
-        reported; `age_s` is the time to the nearest measurement of the joint [s].
+        Arrays (T, B, W, ...). A worker that is tracked in neither direction has the position
+        reported by the forward filter; `age_s` is the time to the nearest measurement of the joint
+        [s].
 
     Raises:
         ConfigError: there are no frames, or the time between them is not positive.
@@ -124,11 +125,11 @@ def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q:
     """Return the smoothed moments of a frame, given those of the next frame.
 
     Args:
-        filtered: moments of the filter in the frame.
-        predicted: (n, d) means of the next frame as predicted from it.
+        filtered: moments of the filter at the frame.
+        predicted: (n, d) means of the next frame, predicted from the filtered ones.
         later: smoothed moments of the next frame.
-        F: (d, d) transition from one frame to the next.
-        Q: (d, d) covariance of its noise.
+        F: (d, d) transition matrix from the frame to the next one.
+        Q: (d, d) covariance of the process noise.
     """
     moved = F @ filtered.cov
     cov_predicted = moved @ F.T + Q
@@ -139,7 +140,7 @@ def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q:
 
 
 def make_linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
-    """Return the motion of a body over `dt_s` [s], as `tree.predict` moves it."""
+    """Return the motion of a body over `dt_s` [s] in the model of `tree.predict`."""
     own, travel, noise, shared = make_motion_model(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
     Q = np.tile(shared[None, :, None, :], (N_JOINTS, 1, N_JOINTS, 1))
@@ -152,11 +153,11 @@ def make_linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
 
 
 def expand_covariance(cov: Floats, slope: Floats) -> Floats:
-    """Return the covariance of all joints, (n, 90, 90).
+    """Return the joint covariance (n, 90, 90) of all joints.
 
     Args:
         cov: (n, J, 6, 6) marginal covariances of the joints.
-        slope: (n, J, 6, 6) slopes on the parents.
+        slope: (n, J, 6, 6) slopes of the joints on their parents.
     """
     out = np.zeros((len(cov), N_JOINTS, 6, N_JOINTS, 6))
     for m, j in enumerate(ORDER):
@@ -168,7 +169,7 @@ def expand_covariance(cov: Floats, slope: Floats) -> Floats:
 
 
 def _expand_axes(blocks: Floats) -> Floats:
-    """Return (90, 90) from blocks (J, 2, J, 2) of position and velocity, equal on each axis."""
+    """Expand blocks (J, 2, J, 2) of position and velocity, equal on all axes, to (90, 90)."""
     full = np.einsum("jakb,cd->jackbd", blocks, np.eye(3))
     return full.reshape(_N, _N)
 
@@ -176,7 +177,7 @@ def _expand_axes(blocks: Floats) -> Floats:
 def _smooth_one_way(
     estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
 ) -> _Smoothed:
-    """Filter through a clip with frames every `dt_s` [s], then smooth backwards."""
+    """Filter a clip with frames every `dt_s` [s] forwards, then smooth it backwards."""
     frames = _filter_clip(estimator, clip, dt_s)
     F, Q = make_linear_motion(dt_s, estimator.config)
     mean, cov = _get_moments(frames[-1])
@@ -202,7 +203,7 @@ def _smooth_one_way(
 def _filter_clip(
     estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
 ) -> list[_FilteredFrame]:
-    """Return the state of the filter in every frame of a clip with frames every `dt_s` [s]."""
+    """Return the state of the filter at every frame of a clip with frames every `dt_s` [s]."""
     batch, _, n_workers = clip[0].px.shape[:3]
     state, frames = estimator.init(batch, n_workers), list[_FilteredFrame]()
 
@@ -215,7 +216,7 @@ def _filter_clip(
         predicted, was_tracked = copy_field("body"), copy_field("tracked")
         estimator.update(state, keypoints, [])
         body, tracked = copy_field("body"), copy_field("tracked")
-        begins = ~body[..., 3:].any((-2, -1))  # at rest: in the first frame of a track only
+        begins = ~body[..., 3:].any((-2, -1))  # only a new track is at rest
         frame = _FilteredFrame(
             predicted=predicted.reshape(-1, _N),
             mean=body.reshape(-1, _N),
@@ -236,14 +237,14 @@ def _get_moments(frame: _FilteredFrame) -> Moments:
 
 
 def _get_position_blocks(cov: Floats) -> Floats:
-    """Return the covariances (n, J, 3, 3) of the positions from those (n, 90, 90) of bodies."""
+    """Return the position covariances (n, J, 3, 3) in the covariances (n, 90, 90) of bodies."""
     joint = np.arange(N_JOINTS)
     blocks = cov.reshape(-1, N_JOINTS, 6, N_JOINTS, 6)
     return np.moveaxis(blocks[:, joint, :3, joint, :3], 0, 1)
 
 
 def _reverse(backward: _Smoothed) -> _Smoothed:
-    """Return the result of a reversed clip in the order of the clip."""
+    """Return the result for a reversed clip in the order of the original clip."""
     mean = backward.mean[::-1].copy()
     mean[..., 3:] *= -1.0
     rest = (backward.cov[::-1], backward.doubt[::-1], backward.age_s[::-1])
@@ -275,7 +276,7 @@ def _make_estimate(
         smoothed: the result for n = B W workers.
         batch: number of environments B.
         n_workers: number of workers W.
-        config: bounds of the covariances.
+        config: settings that contain the bounds of the covariances.
     """
     n_frames = len(smoothed.tracked)
     tracked = smoothed.tracked.reshape(n_frames * batch, n_workers)
@@ -287,6 +288,6 @@ def _make_estimate(
         age_s=smoothed.age_s.reshape(joints),
         tracked=tracked,
     )
-    return mapped(
+    return map_arrays(
         bound_estimate(estimate, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:])
     )

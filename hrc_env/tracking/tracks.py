@@ -1,4 +1,4 @@
-"""Tracks of the estimators without hypotheses, and how all estimators age and report tracks."""
+"""Tracks of the estimators without hypotheses, and functions that age and report all tracks."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -14,11 +14,11 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.settings import Settings, make_settings
 
 _ROUNDING = 1e-6
-"""Relative error allowed in the smallest eigenvalue, as a share of the largest."""
+"""Tolerance of the smallest eigenvalue, as a fraction of the largest variance."""
 
 
 class Track:
-    """The estimate of one worker, with what it takes to age and to repair it."""
+    """The estimate of one worker, and the number of successive contradictions of each joint."""
 
     mean_world: Annotated[Points3, (N_JOINTS, 3)]
     """Position of each joint in the world frame [m]."""
@@ -31,14 +31,14 @@ class Track:
     conflict: Annotated[Ints, (N_JOINTS,)]
     """Number of successive updates in which views contradicted the joint."""
     tracked: bool
-    """Whether the worker is tracked; otherwise the estimate relaxes to the prior."""
+    """Whether the worker is tracked; if not, the estimate relaxes to the prior."""
 
 
 TRACK = dtype_of(Track)
 
 
 class EstimateArrays(NamedTuple):
-    """The arrays of a `PoseEstimate` that estimators fill, as compiled functions take them."""
+    """The arrays of a `PoseEstimate` that estimators fill in, as a tuple for compiled functions."""
 
     mean_world: Points3
     """(B, W, J, 3) positions in the world frame [m]."""
@@ -53,7 +53,7 @@ class EstimateArrays(NamedTuple):
 
 
 def get_estimate_arrays(estimate: PoseEstimate) -> EstimateArrays:
-    """Return the arrays of an estimate, made contiguous where they are not."""
+    """Return the arrays of an estimate, copied where they are not contiguous."""
     return EstimateArrays(
         mean_world=np.ascontiguousarray(estimate.mean_world, np.float64),
         cov_world=np.ascontiguousarray(estimate.cov_world, np.float64),
@@ -68,8 +68,8 @@ def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Records2[T
 
     Args:
         batch: number of environments B.
-        n_workers: number of workers W in each.
-        config: the prior and the largest age.
+        n_workers: number of workers W in each environment.
+        config: settings that contain the prior and the largest age.
     """
     tracks = make_records(Track, (batch, n_workers))
     reset_tracks(tracks, np.arange(batch), config)
@@ -77,12 +77,12 @@ def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Records2[T
 
 
 def reset_tracks(tracks: Records2[Track], ids: Ints, config: TrackerConfig) -> None:
-    """Set the tracks of some environments back to the prior, in place.
+    """Reset the tracks of some environments to the prior, in place.
 
     Args:
         tracks: (B, W) tracks of the whole batch.
         ids: indices of the environments to reset.
-        config: the prior and the largest age.
+        config: settings that contain the prior and the largest age.
     """
     fresh = np.zeros((), TRACK)
     fresh["mean_world"] = config.prior_mean_world
@@ -92,7 +92,7 @@ def reset_tracks(tracks: Records2[Track], ids: Ints, config: TrackerConfig) -> N
 
 
 def age_tracks(tracks: Records2[Track], dt_s: float, config: TrackerConfig) -> None:
-    """Count ages up, end tracks that no measurement supports, and relax lost ones to the prior.
+    """Increase ages, end tracks that no measurement supports, and relax lost ones to the prior.
 
     The mean and the covariance of a lost worker follow an Ornstein-Uhlenbeck process with the
     prior as its stationary distribution.
@@ -100,7 +100,7 @@ def age_tracks(tracks: Records2[Track], dt_s: float, config: TrackerConfig) -> N
     Args:
         tracks: (B, W) tracks, changed in place.
         dt_s: time that passes [s].
-        config: the prior and the times after which tracks are lost and forgotten.
+        config: settings that contain the prior, `lost_after_s` and `lost_relaxation_s`.
     """
     _age_tracks(tracks, dt_s, make_settings(config))
 
@@ -134,17 +134,17 @@ def age_worker(
     dt: float,
     settings: Settings,
 ) -> bool:
-    """Let time pass for one worker and return whether the worker is still tracked.
+    """Increase the ages of one worker's joints and return whether the worker is still tracked.
 
     Args:
-        mean: (J, 3) positions [m], relaxed in place where the worker is not tracked.
-        cov: (J, 3, 3) covariances [m^2], likewise.
-        velocity: (J, 3) velocities [m/s], likewise.
+        mean: (J, 3) positions [m], relaxed in place if the worker is not tracked.
+        cov: (J, 3, 3) covariances [m^2], relaxed likewise.
+        velocity: (J, 3) velocities [m/s], relaxed likewise.
         age: (J,) ages [s], increased in place.
-        conflict: (J,) counts of contradictions, set to zero where the worker is not tracked.
+        conflict: (J,) counts of contradictions, set to zero if the worker is not tracked.
         tracked: whether the worker was tracked before.
         dt: time that passes [s].
-        settings: the prior and the times after which tracks are lost and forgotten.
+        settings: settings that contain the prior, `lost_after_s` and `lost_relaxation_s`.
     """
     youngest = count_up(age, dt, settings.max_age_s)
     if tracked and youngest < settings.lost_after_s - 1e-9:
@@ -188,7 +188,7 @@ def relax(
         cov: (J, 3, 3) covariances [m^2].
         velocity: (J, 3) velocities [m/s].
         keep: share of the deviation from the prior that is kept.
-        prior_mean: position of the prior [m].
+        prior_mean: mean of the prior position [m].
         prior_std: standard deviation of the prior on each axis [m].
     """
     for j in range(len(mean)):
@@ -201,7 +201,7 @@ def relax(
 
 
 def copy_estimate(tracks: Records2[Track]) -> PoseEstimate:
-    """Return the estimate of tracks (B, W), as copies of their fields."""
+    """Return the estimate of tracks (B, W) in new arrays."""
     return PoseEstimate(*(tracks[name].copy() for name in EstimateArrays._fields))
 
 
@@ -211,7 +211,7 @@ def report_tracks(tracks: Records2[Track], config: TrackerConfig) -> PoseEstimat
 
 
 def bound_estimate(estimate: PoseEstimate, config: TrackerConfig) -> PoseEstimate:
-    """Bound the covariances of an estimate by `min_std_m` and the prior, in place; return it."""
+    """Bound the covariances of an estimate by the settings, in place, and return the estimate."""
     _bound_all(estimate.cov_world, config.min_std_m, config.prior_std_m)
     return estimate
 
@@ -248,7 +248,7 @@ def bound(cov: Covariances3, min_std: float, max_std: float) -> None:
 
 @kernel
 def _is_wider(a: Floats, floor: float) -> bool:
-    """Return whether all eigenvalues of a symmetric 3x3 matrix exceed `floor`, without roots."""
+    """Return whether all eigenvalues of a symmetric 3x3 matrix exceed `floor`."""
     x, y, z = a[0, 0] - floor, a[1, 1] - floor, a[2, 2] - floor
     f, g, h = a[0, 1], a[0, 2], a[1, 2]
     determinant = x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)

@@ -1,8 +1,8 @@
-"""The estimators without memory: triangulate each frame, and hold the last point through gaps.
+"""Estimators that triangulate each frame, and keep the last position of a joint through gaps.
 
 `triangulation` is weighted least squares from all views. `ransac` uses the views that agree, which
 it finds by trying every pair of cameras (after Fischler and Bolles, Comm. ACM 24, 1981). A joint
-moves only when two views make a point.
+moves only if at least two views can be triangulated.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from hrc_env.tracking.tree.acquisition import complete_body, keep_one_body
 
 @dataclass(frozen=True, slots=True)
 class TriangulationEstimator:
-    """Triangulation of every frame by itself; see `tracking.estimators.Estimator`."""
+    """Estimator that triangulates each frame on its own; see `tracking.estimators.Estimator`."""
 
     P: Floats
     """(C, 3, 4) projections from the world [m] to pixels."""
@@ -34,23 +34,23 @@ class TriangulationEstimator:
     config: TriangulationConfig
     """Settings of the estimator."""
     gate_sigma: float = 0.0
-    """Gate for the agreement of views, in standard deviations; with 0 all views are used."""
+    """Gate for the agreement of views, in standard deviations; with 0, all views are used."""
 
     def init(self, batch: int, n_workers: int) -> Records2[Track]:
         """Return the tracks (B, W) of workers that have never been detected."""
         return make_tracks(batch, n_workers, self.config)
 
     def reset(self, state: Records2[Track], ids: Ints, rngs: Rngs) -> None:
-        """Reset environments `ids` to the prior, without random numbers."""
+        """Reset environments `ids` to the prior; `rngs` is not used."""
         reset_tracks(state, ids, self.config)
 
     def predict(self, state: Records2[Track], dt_s: float, rngs: Rngs) -> None:
-        """Hold every joint where it was; its covariance grows with the square of the age."""
+        """Keep the positions of all joints; covariances grow with the squares of the ages."""
         _grow_covariances(state, dt_s, self.config.hold_speed_m_s)
         age_tracks(state, dt_s, self.config)
 
     def update(self, state: Records2[Track], keypoints: Keypoints, rngs: Rngs) -> None:
-        """Move every joint to the point that its views make."""
+        """Move every joint to its triangulated position."""
         config, (batch, n_workers) = self.config, state.shape
         detections = get_keypoint_arrays(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         valid = _mask_invalid(detections, config.sigma_scale)
@@ -59,20 +59,20 @@ class TriangulationEstimator:
         _update(state, *points, make_settings(config), config.velocity_tau_s)
 
     def estimate(self, state: Records2[Track]) -> PoseEstimate:
-        """Return the present estimate."""
+        """Return the current estimate."""
         return report_tracks(state, self.config)
 
     def forecast(self, state: Records2[Track], horizon_s: float) -> PoseEstimate:
-        """Return the estimate expected in `horizon_s` [s]; see `tracking.forecast`."""
+        """Return the estimate expected after `horizon_s` [s]; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
 
 def _mask_invalid(detections: KeypointArrays, sigma_scale: float) -> KeypointArrays:
-    """Return detections with NaN pixels and infinite sigma for those that are no measurements.
+    """Return detections in which invalid ones have NaN pixels and infinite standard deviations.
 
     Args:
         detections: (B, C, W, J) detections.
-        sigma_scale: factor on the standard deviations of the others.
+        sigma_scale: factor on the standard deviations of the valid ones.
     """
     px, confidence, sigma_px = detections.px, detections.confidence, detections.sigma_px
     inside = np.all(np.abs(px) < FURTHEST_PX, axis=-1)
@@ -110,13 +110,13 @@ def _update(
     settings: Settings,
     velocity_tau: float,
 ) -> None:
-    """Update tracks (B, W) by triangulated points, in place.
+    """Update tracks (B, W) with triangulated points, in place.
 
     Args:
         tracks: (B, W) tracks.
-        made: (B, W, J, 3) points [m]; NaN where there is none.
+        made: (B, W, J, 3) triangulated points [m]; NaN where there is none.
         cov: (B, W, J, 3, 3) their covariances [m^2].
-        settings: when tracks start and which points belong to a body.
+        settings: settings of the estimator.
         velocity_tau: time constant of the filter on velocities [s].
     """
     found = np.empty(made.shape[2], np.bool_)
@@ -147,7 +147,7 @@ def _update_track(
         track: the track.
         points: (J, 3) points [m].
         spread: (J, 3, 3) their covariances [m^2].
-        found: (J,) joints that have a point.
+        found: (J,) whether the joint has a new point.
         velocity_tau: time constant of the filter on velocities [s].
     """
     mean, velocity, age = track.mean_world, track.velocity_world, track.age_s

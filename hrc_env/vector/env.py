@@ -3,8 +3,9 @@
 import gymnasium, hrc_env
 envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
 
-Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of environments
-and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same environments.
+Environment k equals `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of
+environments and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same
+environments.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,8 +19,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.control import check_action
-from hrc_env.core.batching import State, copied, mapped, one, write_rows
-from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.batching import State, copy_arrays, map_arrays, one, write_rows
+from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, make_spaces
@@ -28,7 +29,7 @@ from hrc_env.rehearsal import rehearse
 from hrc_env.render.views import CameraChoice
 from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
 from hrc_env.tasks.task import AnyTask
@@ -56,16 +57,16 @@ Step: TypeAlias = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]
 ):
-    """A vector environment: robots, each beside workers of its own, that step together.
+    """A vector environment: robots that step together, each with its own workers.
 
-    Environment k after `reset(seed=s)` is the single environment after `reset(seed=s + k)`, bit for
-    bit. Actions are (num_envs, A), observations (num_envs, n).
+    Environment k after `reset(seed=s)` equals the single environment after `reset(seed=s + k)`, bit
+    for bit. Actions are (num_envs, A), observations (num_envs, n).
 
     Args:
         num_envs: number of environments.
-        max_episode_steps: time limit; None for the task's, -1 for none.
-        autoreset_mode: time of the reset after the end of an episode: in the next step (default),
-            in the same step, or never ("Disabled").
+        max_episode_steps: time limit [control steps]; None for the task's limit, -1 for no limit.
+        autoreset_mode: when an environment is reset after the end of an episode: in the next step
+            (default), in the same step, or never ("Disabled").
         num_threads: number of threads that share the environments; None for all cores.
         arguments: fields of `EnvConfig`. perception is "keypoints" (default), "truth" or "none", as
             images have no batched form. With the suffix "_list" of a render mode, `render` returns
@@ -96,13 +97,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
                 "process for each environment, and SB3's make_vec_env with vec_env_cls="
                 'hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it, batched.'
             )
-        settings = settle(**arguments)
+        settings = resolve_settings(**arguments)
         self._open(settings)
         if self.render_mode in LISTS:
             self.metadata["render_modes"].append(self.render_mode)
         self.arguments = arguments if self.render_mode else _without_pictures(arguments)
-        """Arguments of `HRCEnv`, as they were given."""
-        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
+        """Arguments for `HRCEnv`, as given by the user."""
+        self.num_envs = check_integer("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         rehearse(settings)
@@ -113,7 +114,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._streams = [seeding.np_random() for _ in range(self.num_envs)]
-        """Generator of each environment, and its seed."""
+        """Random generator of each environment, and its seed."""
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
         limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = parse_time_limit(limit)
@@ -121,11 +122,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
         self._options: list[dict[str, Any]] = [{}] * self.num_envs
-        """Fixed parts of all episodes to come, by environment."""
+        """Fixed parts of all future episodes, for each environment."""
         self._fixed: list[Fixed | None] = [None] * self.num_envs
-        """Checked form of `_options`."""
+        """Checked form of `_options`, for each environment."""
         self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        """Attributes of each environment that a user has set."""
+        """Attributes that users have set, for each environment."""
 
     def reset(
         self,
@@ -139,17 +140,17 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random stream
                 continues.
             options: options by name. "reset_mask", (num_envs,) bool, selects the environments that
-                start an episode. "steps_left", one or (num_envs,) int, is the number of steps after
-                which these episodes are truncated, if not before; or "elapsed_steps", (num_envs,)
-                int, is the number of steps of the time limit that have passed. The other fields of
-                `ResetOptions` fix parts of the episodes; "each" is a list of a mapping of fields
-                for each environment.
+                start an episode. "steps_left", an int or (num_envs,) int, is the number of steps
+                after which these episodes are truncated at the latest; alternatively,
+                "elapsed_steps", (num_envs,) int, is the number of steps of the time limit that have
+                passed. The other fields of `ResetOptions` fix parts of the episodes; "each" is a
+                list with a mapping of fields for each environment.
 
         Returns:
             Observations of all environments, and infos of those that started.
 
         Raises:
-            ConfigError: an option is invalid; no episode has started then.
+            ConfigError: an option is invalid; in that case no episode is started.
         """
         self.refuse_closed()
         seeds = parse_seeds(seed, self.num_envs)
@@ -165,11 +166,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         fresh = self._begin(ids, fixed)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
-            self._observation = mapped(fresh.observation, np.empty_like)
+            self._observation = map_arrays(fresh.observation, np.empty_like)
         write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
         self.pictures.take(mask, mask)
-        return copied(self._observation), make_table(fresh, ids, self.num_envs).arrays(mask)
+        return copy_arrays(self._observation), make_table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
         """Advance every environment by one control step.
@@ -185,7 +186,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             truncated, and infos: arrays (num_envs,), each with a mask "_name".
         """
         result = self.shards.step(self._check_actions(actions))
-        observation = copied(result.observation)
+        observation = copy_arrays(result.observation)
         info = make_table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
@@ -201,27 +202,27 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._observation, self._ended = observation, ended
         self.pictures.take(np.ones_like(over), over)
         infos = InfoDict({**finals, **info.arrays(np.ones_like(ended))})
-        return copied(observation), reward, terminated, truncated, infos
+        return copy_arrays(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return the indices of infos in words: activities, bodies, contacts and cameras.
+        """Decode the indices in infos to words: activities, bodies, contacts and cameras.
 
         Args:
             infos: infos of `reset` or `step`.
 
         Returns:
-            (num_envs,) tuples of words by the names of docs/reference/infos.md.
+            Arrays (num_envs,) of tuples of words, by the names in docs/reference/infos.md.
         """
         return words_of_infos(infos, self.num_envs, self.shards.first.bodies.names)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix parts of all episodes to come in every environment, until the next call.
+        """Fix parts of all future episodes in every environment, until the next call.
 
         Args:
-            options: options of `reset`, "each" included; None fixes nothing.
+            options: options of `reset`, including "each"; None fixes nothing.
 
         Raises:
-            ConfigError: an option is invalid, or for a single reset only.
+            ConfigError: an option is invalid, or is permitted for a single reset only.
         """
         each = split_options(lasting_options(options, *OF_VECTORS), self.num_envs)
         for of_one in each:
@@ -232,13 +233,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._options, self._fixed = each, fixed
 
     def get_state(self) -> State:
-        """Return a copy of the whole state, options of `set_options` included."""
-        return {**super().get_state(), "options": copied(self._options)}
+        """Return a copy of the whole state, including the options of `set_options`."""
+        return {**super().get_state(), "options": copy_arrays(self._options)}
 
     def set_state(self, state: State) -> None:
-        """Restore a state that was taken with the same arguments, bit for bit."""
+        """Restore a state of an environment with the same arguments, bit for bit."""
         super().set_state(state)
-        self.set_options({"each": copied(state["options"])})
+        self.set_options({"each": copy_arrays(state["options"])})
 
     def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
         """Raise the `ConfigError` that a reset of environment `k` would raise for these options."""
@@ -247,11 +248,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.shards.first.fix({**self._options[k], **given})
 
     def options_of(self, k: int) -> dict[str, Any]:
-        """Return the options of all episodes to come of environment `k`, by name."""
+        """Return the options of all future episodes of environment `k`, by name."""
         return dict(self._options[k])
 
     def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Fix parts of all episodes to come of environment `k` alone."""
+        """Fix parts of all future episodes of environment `k` alone."""
         given = lasting_options(options)
         fixed = self.shards.first.fix(given) if given else None
         self._options = [given if b == k else each for b, each in enumerate(self._options)]
@@ -260,20 +261,20 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Set the weights of the reward's terms in all environments, as `HRCEnv.set_reward`."""
+        """Set the weights of the reward terms in all environments, as `HRCEnv.set_reward` does."""
         for part in self.shards.parts:
             part.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> tuple[Any, ...] | None:  # type: ignore[override]
         """Return every environment's picture, or its list of pictures, by the render mode.
 
-        They are drawn one after the other, which is slow.
+        The pictures are drawn one after the other, which is slow.
 
         Args:
-            camera: camera of the pictures, as for `HRCEnv.render`; not for lists.
+            camera: camera of the pictures, as for `HRCEnv.render`; must be None for lists.
 
         Raises:
-            ConfigError: there is no such camera.
+            ConfigError: the camera does not exist.
         """
         self.refuse_closed()
         if self.render_mode is None:
@@ -281,7 +282,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(self.pictures.of(k, camera) for k in range(self.num_envs))
 
     def member(self, k: int) -> Member:
-        """Return environment `k` alone."""
+        """Return the interface of environment `k` alone."""
         return Member(self, k)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
@@ -298,11 +299,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(each(*args, **kwargs) if callable(each) else each for each in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of every environment, as of `Member`."""
+        """Return an attribute of every environment, as `Member` has it."""
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set a user's own attribute of every environment, as of `Member`.
+        """Set a user's attribute of every environment, as an attribute of `Member`.
 
         Args:
             name: name of the attribute.
@@ -315,7 +316,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation of the environments; of several, the first."""
+        """Simulation of the environments; the first one if there are several."""
         return self.shards.first
 
     @property
@@ -350,7 +351,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.shards.first.reward_factors.get(term, 1.0)
 
     def _begin(self, ids: Ints, fixed: Sequence[Fixed | None] = ()) -> StepResult:
-        """Begin new episodes of environments `ids`, whose random streams continue."""
+        """Begin new episodes in environments `ids`; their random streams continue."""
         self._steps[ids] = 0
         return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()], fixed)
 
@@ -358,8 +359,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """Return the fixed parts of the episodes of environments `ids`.
 
         Args:
-            ids: (n,) the environments in question.
-            each: options of a reset, B of them.
+            ids: (n,) indices of the environments.
+            each: options of one reset for each of the B environments.
         """
         if not any(each):
             return [self._fixed[k] for k in ids.tolist()]
@@ -369,9 +370,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """Reset environments, and replace their observations and infos.
 
         Args:
-            mask: (B,) the environments in question.
-            observation: observations, whose rows are replaced.
-            info: infos, whose rows are replaced.
+            mask: (B,) mask of the environments that are reset.
+            observation: observations of all environments; the rows of those that are reset are
+                replaced.
+            info: infos of all environments; the rows of those that are reset are replaced.
         """
         ids = np.flatnonzero(mask)
         fresh = self._begin(ids, [self._fixed[k] for k in ids.tolist()])
@@ -396,7 +398,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return arguments without those of pictures."""
+    """Return arguments without those that concern pictures."""
     names = ("render_mode", "width", "height", "render_markers", "overlay")
     return {name: value for name, value in arguments.items() if name not in names}
 
@@ -411,9 +413,9 @@ def _fix_episodes(
 
     Args:
         simulation: a simulation with their settings.
-        ids: (n,) the environments in question.
-        lasting: options of all resets, B of them.
-        each: options of one reset, B of them.
+        ids: (n,) indices of the environments.
+        lasting: options of all resets for each of the B environments.
+        each: options of one reset for each of the B environments.
     """
     known: dict[tuple[int, int], Fixed | None] = {}
     for k in ids.tolist():
@@ -425,9 +427,9 @@ def _fix_episodes(
 
 
 def _finals(observation: Observation, info: InfoTable, ended: Bools) -> dict[str, Any]:
-    """Return the last observations and infos of the episodes that `ended` (B,)."""
+    """Return the final observations and infos of the episodes that `ended` (B,)."""
     last = np.full(len(ended), None, object)
     for b in np.flatnonzero(ended):
-        last[b] = copied(one(observation, int(b)))
+        last[b] = copy_arrays(one(observation, int(b)))
     final_info = {"final_info": info.arrays(ended), "_final_info": ended.copy()}
     return {"final_obs": last, "_final_obs": ended.copy(), **final_info}

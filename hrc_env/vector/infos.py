@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import InfoDict, matching, published, worded
+from hrc_env.core.infos import InfoDict, match_keys, name_indices, publish
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult
 
@@ -26,28 +26,28 @@ class InfoTable:
     """Named values of B environments."""
 
     values: dict[str, Floats]
-    """(B,) numbers by name; NaN for an environment without a value."""
+    """Numbers (B,) by name; NaN for an environment without a value."""
 
     def write(self, ids: Ints | slice, result: StepResult) -> None:
-        """Write the infos of a result of environments `ids`."""
+        """Write the infos of a result to the rows of environments `ids`."""
         for name, values in result.info.items():
             self.values[name][ids] = values
 
     def arrays(self, mask: Bools) -> InfoDict:
-        """Return values and masks by name; environments outside of the mask (B,) have none."""
+        """Return values and masks by name; environments outside the mask (B,) have no values."""
         infos = InfoDict()
-        for name, values in published(self.values).items():
+        for name, values in publish(self.values).items():
             infos[name] = np.where(mask, values, np.zeros_like(values))
             infos[f"_{name}"] = mask.copy()
         return infos
 
 
 def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
-    """Return the infos of some environments as a table of all.
+    """Return the infos of some environments as a table of all environments.
 
     Args:
         result: result of environments `ids`.
-        ids: these environments.
+        ids: indices of these environments.
         batch: number of all environments, B.
     """
     table = InfoTable({name: _fill(batch, values) for name, values in result.info.items()})
@@ -56,19 +56,21 @@ def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 
 
 def _fill(batch: int, values: NDArray[Any]) -> NDArray[Any]:
-    """Return (B,) missing values of the type of an array: NaN, or -1 for integers."""
+    """Return an array (B,) of missing values with the type of `values`: NaN, or -1 for integers."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
 
 
 def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of infos that match patterns, of a small environment.
+    """Return the names of infos that match patterns.
+
+    The names are those of a small environment with the given arguments.
 
     Args:
         patterns: names, or patterns of names such as "safety/*".
         arguments: arguments of `HRCVectorEnv`.
 
     Raises:
-        ConfigError: no name matches a pattern, or it is no text.
+        ConfigError: no name matches a pattern, or a pattern is not a string.
     """
     if not isinstance(patterns, str) and not patterns:
         return ()
@@ -76,18 +78,18 @@ def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
     given = {name: value for name, value in arguments.items() if name in known}
     with warnings.catch_warnings():  # the environment itself repeats them
         warnings.simplefilter("ignore")
-        small = Simulation(1, settle(**{"perception": "keypoints", **given}))
+        small = Simulation(1, resolve_settings(**{"perception": "keypoints", **given}))
     try:
         first = small.reset(np.arange(1), [np.random.default_rng(0)])
     finally:
         small.close()
-    return matching(patterns, list(first.info_of(0)))
+    return match_keys(patterns, list(first.info_of(0)))
 
 
 def words_of_infos(
     infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
 ) -> dict[str, NDArray[np.object_]]:
-    """Return the indices of a batch's infos in words.
+    """Decode the indices in the infos of a batch to words.
 
     Args:
         infos: arrays (num_envs,) by name.
@@ -95,12 +97,12 @@ def words_of_infos(
         bodies: names of the workers' bodies.
 
     Returns:
-        (num_envs,) tuples of words by name.
+        Arrays (num_envs,) of tuples of words, by name.
     """
     words = words_of(bodies)
     numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
     worded_infos = [
-        worded({name: values[b] for name, values in numbers.items()}, words)
+        name_indices({name: values[b] for name, values in numbers.items()}, words)
         for b in range(num_envs)
     ]
     return {

@@ -1,4 +1,4 @@
-"""Make vector environments: one batch, or at level "pixels" a process for each environment."""
+"""Construction of vector environments: one batch, or for "pixels" one process per environment."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -21,13 +21,13 @@ from hrc_env.vector.infos import words_of_infos
 from hrc_env.vector.options import split_options
 
 PROCESSES_PER_CORE = 2
-"""Largest number of processes a core; more renderers and networks are no faster."""
+"""Maximum number of processes per core; more renderers and networks are no faster."""
 REFUSING = ("check_options", "set_options", "set_reward")
-"""Methods of `HRCEnv` that raise errors for arguments."""
+"""Methods of `HRCEnv` that raise errors for invalid arguments."""
 
 
 def raise_first_error(results: Iterable[Any]) -> tuple[Any, ...]:
-    """Return results of `HRCEnv.attempt`, or raise the first error among them."""
+    """Return the results of `HRCEnv.attempt`, or raise the first error among them."""
     values = tuple(results)
     for value in values:
         if isinstance(value, ConfigError):
@@ -36,13 +36,13 @@ def raise_first_error(results: Iterable[Any]) -> tuple[Any, ...]:
 
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
-    """Environments at level "pixels", a process for each.
+    """Environments at level "pixels", with one process for each.
 
-    Errors of options and rewards are raised in this process, and the others continue.
+    Errors in options and rewards are raised in the calling process, and the environments continue.
     """
 
     def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
-        """Start resets; the arguments are those of `HRCVectorEnv.reset`."""
+        """Start resets with the arguments of `HRCVectorEnv.reset`."""
         given = named_options(options, "reset_mask", "each")
         mask = {name: given.pop(name) for name in ("reset_mask",) if name in given}
         if given:
@@ -53,18 +53,18 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         super().reset_async(seed, mask or None)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix parts of all episodes to come, as `HRCVectorEnv.set_options` does."""
+        """Fix parts of all future episodes, as `HRCVectorEnv.set_options` does."""
         self.set_attr("options", split_options(lasting_options(options, "each"), self.num_envs))
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of every environment, "options" among them.
+        """Set an attribute of every environment, which may be "options".
 
         Args:
             name: name of the attribute.
             values: a value for all environments, or a list or tuple with one for each.
 
         Raises:
-            ConfigError: an option is invalid; no environment's options have changed then.
+            ConfigError: an option is invalid; in that case no environment's options are changed.
         """
         if name == "options":
             each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
@@ -73,23 +73,23 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         super().set_attr(name, values)
 
     def call_async(self, name: str, /, *args: Any, **kwargs: Any) -> None:
-        """Start a call of every environment; `call_wait` raises its errors."""
+        """Start a method call in every environment; `call_wait` raises its errors."""
         attempt = ("attempt",) if name in REFUSING else ()
         super().call_async(*attempt, name, *args, **kwargs)
 
     def call_wait(self, timeout: float | None = None) -> tuple[Any, ...]:
-        """Return the results of calls.
+        """Return the results of the calls that were started.
 
         Args:
             timeout: time after which `TimeoutError` is raised [s]; None for no limit.
 
         Raises:
-            ConfigError: an environment refuses the arguments.
+            ConfigError: an environment rejects the arguments.
         """
         return raise_first_error(super().call_wait(timeout))
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return the indices of infos in words, as `HRCVectorEnv.words` does."""
+        """Decode the indices in infos to words, as `HRCVectorEnv.words` does."""
         return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
 
     def _set_next_options(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:
@@ -97,7 +97,7 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
 
         Args:
             each: options for each environment.
-            lasting: whether they are for all resets to come.
+            lasting: whether they hold for all future resets.
         """
         super().set_attr("next_options", list(each))
         try:
@@ -115,14 +115,15 @@ def make_vector(
     Args:
         num_envs: number of environments.
         perception: perception level, as for `HRCEnv`.
-        force: whether more than two processes a core are allowed with "pixels".
-        kwargs: arguments of `HRCVectorEnv`; without `num_threads` with "pixels".
+        force: whether more than two processes per core are permitted with "pixels".
+        kwargs: arguments of `HRCVectorEnv`; "pixels" does not accept `num_threads`.
 
     Returns:
-        An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
+        An `HRCVectorEnv`; for "pixels", gymnasium's `AsyncVectorEnv` with one process per
+        environment.
 
     Raises:
-        ConfigError: a value is not valid, or there are too many processes.
+        ConfigError: a value is invalid, or there are too many processes.
     """
     if perception != "pixels":
         if kwargs.get("render_mode") != "human":

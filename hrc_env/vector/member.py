@@ -1,4 +1,4 @@
-"""One environment of a vector environment alone, with the interface of `HRCEnv`."""
+"""Interface of a single environment in a vector environment, like that of `HRCEnv`."""
 
 import inspect
 from collections.abc import Mapping
@@ -11,10 +11,10 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.core.batching import copied, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
+from hrc_env.core.batching import copy_arrays, one
+from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error
 from hrc_env.core.infos import InfoDict
-from hrc_env.core.mapping import plain
+from hrc_env.core.mapping import convert_to_plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig
@@ -35,17 +35,17 @@ ALIKE = (
     "max_episode_steps",
     "render_mode",
 )
-"""Attributes of the vector environment that are those of every environment."""
+"""Attributes of the vector environment that are the same for every environment."""
 TOGETHER = ("close", "set_reward")
-"""Methods for all environments together only."""
+"""Methods that can only be called for all environments together."""
 TAKEN = {*inspect.signature(HRCEnv).parameters, *dir(HRCEnv), *ALIKE, "simulation", "views"}
-"""Names of an environment's attributes and arguments, which a user's own must not have."""
+"""Names of an environment's attributes and arguments, which users' attributes must not have."""
 
 
 class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
-    """Environment `k` of a vector environment: its attributes, pictures and resets.
+    """Interface of environment `k` of a vector environment: attributes, pictures and resets.
 
-    It steps only together with the others. The vector environment stores attributes of a user.
+    It can step only together with the others. The vector environment stores users' attributes.
 
     Args:
         vector: the vector environment.
@@ -69,10 +69,10 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             seed=[seed if each else None for each in alone],
             options={"reset_mask": alone, "each": [options if each else None for each in alone]},
         )
-        return copied(one(observation, self._k)), info_of(infos, self._k)
+        return copy_arrays(one(observation, self._k)), info_of(infos, self._k)
 
     def step(self, action: Any) -> NoReturn:
-        """Raise `ConfigError`, as environments step together."""
+        """Raise `ConfigError`, because environments can only step together."""
         raise ConfigError(
             f"Environment {self._k} of {self._vector} steps with the others: call step() of the "
             "vector, with an action for each."
@@ -80,19 +80,19 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """Calibration of this episode's cameras, as the estimator has it."""
+        """Calibration of this episode's cameras, as known to the estimator."""
         simulation, b = self._vector.shards.locate(self._k)
         return simulation.rig_of(b)
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """Faults of this episode's cameras, each with its drawn amount."""
+        """Faults of this episode's cameras, each with its drawn severity."""
         simulation, b = self._vector.shards.locate(self._k)
         return simulation.cameras.faults_of(b)
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of all episodes to come by name; they can be set."""
+        """Options of all future episodes by name; they can be set."""
         return self._vector.options_of(self._k)
 
     @options.setter
@@ -100,11 +100,11 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.set_options(options)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix parts of all episodes to come of this environment, as `HRCEnv.set_options`."""
+        """Fix parts of all future episodes of this environment, as `HRCEnv.set_options` does."""
         self._vector.set_options_of(self._k, options)
 
     def render(self, camera: CameraChoice = None) -> Any:
-        """Return a picture of this environment; with a mode "..._list", those since the last call.
+        """Return a picture of this environment, or for a list mode those since the last call.
 
         Args:
             camera: camera of the picture, as for `HRCEnv.render`.
@@ -118,7 +118,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._vector.pictures.mosaic(self._k)
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
-        """Return the terms of an observation by name, as `HRCEnv.split_observation`."""
+        """Return the terms of an observation by name, as `HRCEnv.split_observation` does."""
         return observations.split(observation, self._vector.shards.first.layout)
 
     @property
@@ -133,7 +133,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def metadata(self) -> dict[str, Any]:  # type: ignore[override]
-        """Metadata of one environment, without the `autoreset_mode`."""
+        """Metadata of one environment, without `autoreset_mode`."""
         metadata = self._vector.metadata
         return {name: value for name, value in metadata.items() if name != "autoreset_mode"}
 
@@ -151,7 +151,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             return None
         limit = None if vector.max_episode_steps == ENDLESS else vector.max_episode_steps
         kwargs = {**vector.arguments, "task": vector.task.id}
-        return replace(known, max_episode_steps=limit, kwargs=plain(kwargs))
+        return replace(known, max_episode_steps=limit, kwargs=convert_to_plain(kwargs))
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -164,7 +164,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def np_random_seed(self) -> int:
-        """Seed of the random generator; -1 for one that a user has set."""
+        """Seed of the random generator; -1 if a user has set the generator."""
         return self._vector.np_random_seed[self._k]
 
     def __getattr__(self, name: str) -> Any:
@@ -175,7 +175,9 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         if name not in self._vector.notes[self._k]:
             valid = [each for each in dir(self) if not each.startswith("_")]
             valid += [each for each in (*ALIKE, *TOGETHER) if each not in valid]
-            raise NoAttributeError(str(unknown("attribute of one environment", name, valid)))
+            raise NoAttributeError(
+                str(make_unknown_name_error("attribute of one environment", name, valid))
+            )
         return self._vector.notes[self._k][name]
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -196,6 +198,6 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
 
 def info_of(infos: Mapping[str, Any], b: int) -> InfoDict:
-    """Return the info of environment `b` among the infos of a vector environment."""
+    """Return the info of environment `b` from the infos of a vector environment."""
     names = (name for name in infos if not name.startswith(("_", "final_")))
     return InfoDict({name: infos[name][b] for name in names})

@@ -1,4 +1,4 @@
-"""Parse the arguments of the vector environment and the options of its `reset`."""
+"""Parsing of the arguments of the vector environment and of the options of its `reset`."""
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,43 +8,51 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
+from hrc_env.core.errors import (
+    ConfigError,
+    check_integer,
+    check_names,
+    check_shape,
+    make_unknown_name_error,
+)
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Ints
 from hrc_env.env import ENDLESS
 from hrc_env.reset_options import ResetOptions, named_options
 
 MAX_ENVS = 16_384
-"""Largest number of environments; more would take gigabytes and be no faster."""
+"""Maximum number of environments; more would need gigabytes of memory and be no faster."""
 ALONE = ("steps_left", "elapsed_steps")
-"""Options of a reset that may differ between environments beside `ResetOptions`."""
+"""Options of a reset that may differ between environments, in addition to `ResetOptions`."""
 ROWS = {"goal": 1, "start_q": 1, "n_workers": 0, "steps_left": 0, "elapsed_steps": 0}
-"""Options that may be an array with a row an environment, with the number of axes of a row."""
+"""Options that may be arrays with one row per environment, and the number of axes of a row."""
 OF_VECTORS = ("reset_mask", "elapsed_steps", "each")
-"""Options of a reset that only vector environments take."""
+"""Options of a reset that only vector environments accept."""
 
 
 def parse_time_limit(max_episode_steps: int) -> int:
-    """Return the time limit of an episode [control steps]; -1 stands for none."""
+    """Return the time limit of an episode [control steps]; -1 means no limit."""
     if max_episode_steps == -1:
         return ENDLESS
-    return whole("max_episode_steps", max_episode_steps, 1, ENDLESS)
+    return check_integer("max_episode_steps", max_episode_steps, 1, ENDLESS)
 
 
 def parse_autoreset(mode: str | AutoresetMode) -> AutoresetMode:
-    """Return the mode of resets after the end of an episode."""
+    """Return the parsed mode of resets after the end of an episode."""
     try:
         return AutoresetMode(mode)
     except ValueError as error:
-        raise unknown("autoreset_mode", mode, [each.value for each in AutoresetMode]) from error
+        raise make_unknown_name_error(
+            "autoreset_mode", mode, [each.value for each in AutoresetMode]
+        ) from error
 
 
 def parse_threads(num_threads: int | None) -> int:
-    """Return the number of threads; None stands for the number of cores."""
+    """Return the number of threads; None means the number of cores."""
     cores = n_cores()
     if num_threads is None:
         return cores
-    n_threads = whole("num_threads", num_threads, 1, MAX_ENVS)
+    n_threads = check_integer("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
         warnings.warn(
             f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
@@ -54,7 +62,7 @@ def parse_threads(num_threads: int | None) -> int:
 
 
 def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return a seed, or None, for each environment."""
+    """Return a list with the seed, or None, of each environment."""
     if seed is None:
         return [None] * num_envs
     if isinstance(seed, (int, np.integer)):
@@ -74,11 +82,11 @@ class ParsedOptions:
     """Parsed options of a vector environment's reset."""
 
     mask: Bools
-    """(B,) whether each environment is reset."""
+    """Whether each environment is reset (B,)."""
     elapsed_steps: Ints
-    """(B,) steps of the time limit that have passed."""
+    """Number of steps of the time limit that have passed (B,)."""
     each: list[dict[str, Any]]
-    """Fixed parts of each episode, by name."""
+    """Fixed parts of each environment's episode, by name."""
 
 
 def read_options(
@@ -112,16 +120,16 @@ def split_options(
 ) -> list[dict[str, Any]]:
     """Return the options of each environment by name.
 
-    They come from values for all environments, arrays with a row for each, and the list "each". If
-    all environments have the same options, they share one dictionary.
+    They are combined from values for all environments, arrays with one row per environment, and the
+    list "each". If all environments have the same options, they share one dictionary.
 
     Args:
         options: options as a record or a mapping.
         num_envs: number of environments.
-        more: further names that are valid within "each".
+        more: additional names that are valid within "each".
 
     Raises:
-        ConfigError: a name is unknown, a list has another length, or an option is given twice.
+        ConfigError: a name is unknown, a list has the wrong length, or an option is given twice.
     """
     given = named_options(options, "each", *more)
     lists = given.pop("each", None)
@@ -152,7 +160,7 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
     """Return whether a value has a row for each environment.
 
     Raises:
-        ConfigError: it has another number of rows.
+        ConfigError: the number of rows is wrong.
     """
     try:
         lead = np.shape(value)[:1]
@@ -165,11 +173,11 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
 
 
 def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
-    """Return the steps of one environment's time limit that have passed.
+    """Return the number of steps of one environment's time limit that have passed.
 
     Args:
         options: "steps_left" or "elapsed_steps" of the environment.
-        max_episode_steps: its time limit.
+        max_episode_steps: time limit of the environment.
 
     Raises:
         ConfigError: an option is unknown or invalid.
@@ -181,7 +189,7 @@ def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: in
 
 
 def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) -> Ints:
-    """Return (B,) the elapsed steps, from "steps_left" or "elapsed_steps"."""
+    """Return the number of elapsed steps (B,), from "steps_left" or "elapsed_steps"."""
     if "elapsed_steps" in steps and "steps_left" in steps:
         raise ConfigError("elapsed_steps and steps_left say the same: give one of them.")
     if "steps_left" in steps:
@@ -194,7 +202,7 @@ def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) ->
 
 
 def _mask(mask: Any, num_envs: int) -> Bools:
-    """Return a valid mask (B,) of environments to reset, or raise `ConfigError`."""
+    """Return a valid mask (B,) of the environments to reset, or raise `ConfigError`."""
     if not isinstance(mask, np.ndarray) or mask.dtype != bool:
         raise ConfigError(
             'options["reset_mask"] must be a NumPy array of bool, one for each environment, '
@@ -207,7 +215,7 @@ def _mask(mask: Any, num_envs: int) -> Bools:
 
 
 def _steps(name: str, value: Any, num_envs: int, low: int, high: int) -> Ints:
-    """Return (B,) numbers of steps from `low` to `high`, or raise `ConfigError`."""
+    """Return numbers of steps (B,) from `low` to `high`, or raise `ConfigError`."""
     steps = np.asarray(value)
     check_shape(name, steps.shape, (num_envs,), "one for each environment")
     is_whole = np.issubdtype(steps.dtype, np.integer)

@@ -1,4 +1,4 @@
-"""Pictures of many environments: of the present step, or of all since the last `render`."""
+"""Pictures of many environments: of the current step, or of all steps since the last `render`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -13,14 +13,14 @@ from hrc_env.render.views import CameraChoice, Views
 from hrc_env.vector.shards import Shards
 
 LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
-"""Render modes with a picture of every step, as `gymnasium.make` has for single environments."""
+"""Render modes that return a picture of every step, as `gymnasium.make` offers them."""
 
 
 class LocatedView(NamedTuple):
-    """The views of an environment's shard."""
+    """Views of the shard that contains an environment."""
 
     view: Views
-    """Views of the shard."""
+    """Views of that shard."""
     b: int
     """Index of the environment in the shard."""
 
@@ -29,7 +29,7 @@ class Pictures:
     """Renderer of the environments of shards.
 
     Args:
-        shards: the environments.
+        shards: simulations of the environments.
         render_mode: form of the pictures; None for none.
         size: width and height of the pictures [px].
         shown: arguments `markers` and `capsules` of `Views.picture`.
@@ -46,20 +46,20 @@ class Pictures:
         self.shown = dict(shown)
         self.views = [Views(part) for part in shards.parts]
         self._film: list[list[NDArray[Any]]] = [[] for _ in range(shards.bounds[-1])]
-        """Pictures of each environment since its last `of`, in the modes `LISTS`."""
+        """Pictures of each environment since the last call of `of`, in the modes `LISTS`."""
 
     def of(self, k: int, camera: CameraChoice = None) -> Any:
-        """Return the picture of environment `k`, or its list of pictures, which is then emptied.
+        """Return the picture of environment `k`, or its list of pictures, which is then cleared.
 
         Args:
-            k: the environment.
-            camera: camera of the picture, as for `Views.picture`; not for lists.
+            k: index of the environment.
+            camera: camera of the picture, as for `Views.picture`; must be None for lists.
 
         Returns:
-            None without a render mode.
+            The picture or the list; None without a render mode.
 
         Raises:
-            ConfigError: there is no such camera, or a camera was given for a list.
+            ConfigError: the camera does not exist, or a camera was given for a list.
         """
         if self.render_mode is None:
             return None
@@ -79,11 +79,11 @@ class Pictures:
         return view.mosaic(b)
 
     def take(self, mask: Bools, is_first: Bools) -> None:
-        """Add a picture of the present step to the lists, in the modes `LISTS`.
+        """Add a picture of the current step to the lists, in the modes `LISTS`.
 
         Args:
-            mask: (B,) the environments in question.
-            is_first: (B,) whether the step is the first of an episode, which empties the list.
+            mask: (B,) mask of the environments whose picture is added.
+            is_first: (B,) whether the step is the first of an episode, which clears the list.
         """
         if self.render_mode not in LISTS:
             return
@@ -103,6 +103,6 @@ class Pictures:
         return view.picture(is_depth, b, self.size, camera=camera, **self.shown)
 
     def _locate(self, k: int) -> LocatedView:
-        """Return the views of environment `k`'s shard, and its index there."""
+        """Return the views of environment `k`'s shard, and the environment's index there."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
         return LocatedView(self.views[shard], k - self.bounds[shard])

@@ -1,6 +1,6 @@
-"""A batch of environments in contiguous ranges, each a `Simulation` with a thread of its own.
+"""A batch of environments in contiguous ranges, each a `Simulation` with its own thread.
 
-Results depend neither on the size of a batch nor on the number of ranges.
+Results depend neither on the batch size nor on the number of ranges.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -20,21 +20,21 @@ from hrc_env.step_result import StepResult, concatenate_results
 
 
 class Located(NamedTuple):
-    """The simulation of an environment."""
+    """Simulation that contains an environment, and the environment's index there."""
 
     simulation: Simulation
-    """The simulation."""
+    """The simulation that contains the environment."""
     b: int
     """Index of the environment in the simulation."""
 
 
 class Shards:
-    """Environments in several simulations; the calling thread steps the first one.
+    """Environments in several simulations, the first of which runs in the calling thread.
 
     Args:
         batch: number of environments.
         n_shards: number of simulations.
-        make: function of a number of environments that returns their simulation.
+        make: function that returns a simulation of a given number of environments.
     """
 
     def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
@@ -47,17 +47,17 @@ class Shards:
     def reset(
         self, ids: Ints, rngs: Sequence[np.random.Generator], fixed: Sequence[Fixed | None] = ()
     ) -> StepResult:
-        """Begin new episodes of environments `ids`, in the calling thread.
+        """Begin new episodes in environments `ids`, in the calling thread.
 
-        Most of a reset is Python code, which further threads would not speed up.
+        Most of a reset is Python code, which additional threads would not speed up.
 
         Args:
-            ids: (n,) the environments in question, sorted.
-            rngs: n generators, one for each.
+            ids: (n,) sorted indices of the environments.
+            rngs: random generators of these n environments.
             fixed: fixed parts of each episode; empty for none.
 
         Returns:
-            The result of these environments, n rows.
+            The result of these environments, with n rows.
         """
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
@@ -69,7 +69,7 @@ class Shards:
         return concatenate_results(_collect(jobs))
 
     def locate(self, k: int) -> Located:
-        """Return the simulation of environment k, and its index there."""
+        """Return the simulation of environment `k`, and the environment's index there."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
         return Located(self.parts[shard], k - self.bounds[shard])
 
@@ -115,10 +115,10 @@ class Shards:
 
 
 def _collect(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
-    """Return the results of jobs; after all have ended, raise the first error among them.
+    """Return the results of jobs; once all have ended, raise the first error if there is one.
 
     Args:
-        jobs: index of the first environment of each job, and the job.
+        jobs: pairs of the index of a job's first environment and the job.
     """
     results, errors = list[StepResult](), list[BaseException]()
     for first, job in jobs:

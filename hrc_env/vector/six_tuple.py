@@ -36,7 +36,7 @@ class CostEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 class CostVectorEnv(VectorWrapper):
     """A vector environment in which `step` returns six values, the cost (B,) as the third.
 
-    At the end of an episode it is the cost of its last step, also if the next episode begins in the
+    At the end of an episode it is the cost of the last step, even if the next episode begins in the
     same step.
     """
 
@@ -58,7 +58,7 @@ class CostVectorEnv(VectorWrapper):
 
 
 def _read_cost(info: dict[str, Any]) -> Any:
-    """Return the cost in infos, or raise `ConfigError` if there is none."""
+    """Return the cost from infos, or raise `ConfigError` if there is none."""
     if "cost" not in info:
         raise ConfigError('The environment gives no info["cost"]; those of hrc_env do.')
     return info["cost"]

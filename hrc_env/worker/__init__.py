@@ -1,1 +1,1 @@
-"""A worker's body: measures, surface and the props in the hands."""
+"""Bodies of workers: measurements, surfaces, and props in the hands."""

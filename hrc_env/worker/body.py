@@ -1,6 +1,6 @@
 """The worker's body: 22 segments, 15 joints and the capsules around them.
 
-The numbers are from `assets/workers/<name>.npz`, which `assets/workers/bake.py` writes. In the rest
+The data are read from `assets/workers/<name>.npz`, written by `assets/workers/bake.py`. In the rest
 frame x is forward, y left, z up, with the origin on the floor below the pelvis; at rest all
 segments are aligned with it.
 """
@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.batching import flatten_axes
+from hrc_env.core.errors import ConfigError, check_shape, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
@@ -34,7 +34,7 @@ PARENT: Ints = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Measures of one worker, or of N workers with a first axis of N; lengths are in metres."""
+    """Measurements of one worker, or of N workers along a leading axis; lengths are in metres."""
 
     names: tuple[str, ...]
     """Names of the workers."""
@@ -45,13 +45,13 @@ class Body:
     joint_segment: Ints
     """Segment (J,) that carries each of the 15 joints."""
     joint_offset: Points3
-    """Position (..., J, 3) of each BlazePose joint in that segment's frame [m]."""
+    """Position (..., J, 3) of each BlazePose joint in the frame of its segment [m]."""
     capsule_names: tuple[str, ...]
     """Names of the capsules."""
     capsule_segment: Ints
     """Segment (K,) that carries each capsule."""
     capsule_ends: Points3
-    """End points (..., K, 2, 3) in that segment's frame [m]."""
+    """End points (..., K, 2, 3) of each capsule in the frame of its segment [m]."""
     capsule_radius_m: Floats
     """Radius (..., K) of each capsule [m]."""
 
@@ -61,7 +61,7 @@ MEASURED = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsu
 
 
 def assets_dir() -> Path:
-    """Return the folder of assets; in a checkout it is a link to `assets/` beside the package."""
+    """Return the assets folder; in a checkout it is a link to `assets/` beside the package."""
     return Path(__file__).parents[1] / "assets"
 
 
@@ -72,7 +72,7 @@ def worker_names() -> tuple[str, ...]:
 
 @functools.cache
 def load_body(name: str = "worker_1") -> Body:
-    """Read the measures of a baked worker; `ConfigError` if no worker of that name was baked."""
+    """Read the measurements of a baked worker; raise `ConfigError` if the name is unknown."""
     with np.load(find_baked(name)) as baked:
         return Body(
             names=(name,),
@@ -85,7 +85,7 @@ def load_body(name: str = "worker_1") -> Body:
 
 @functools.cache
 def load_bodies(names: tuple[str, ...]) -> Body:
-    """Read the measures of several baked workers."""
+    """Read the measurements of several baked workers."""
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
@@ -96,11 +96,11 @@ def load_bodies(names: tuple[str, ...]) -> Body:
 
 
 ANY = "any"
-"""Stands for all baked workers."""
+"""Name that selects all baked workers."""
 
 
 def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of bodies that workers can have: one, several, or all (`ANY`)."""
+    """Return the names of the bodies that workers can have; `ANY` selects all of them."""
     if worker == ANY:
         return worker_names()
     names = (worker,) if isinstance(worker, str) else tuple(worker)
@@ -112,30 +112,30 @@ def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
         )
     for name in names:
         if name not in worker_names():
-            raise unknown("worker", name, valid)
+            raise make_unknown_name_error("worker", name, valid)
     return names
 
 
 def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
-    """Return joints, their velocities and capsules of bodies in motion.
+    """Return the joints, joint velocities and capsules of moving bodies.
 
     Args:
-        body: measures of one body, or of several.
-        motion: segments (..., S, 3 or 4); its `body` holds the rows of several bodies.
+        body: measurements of one body or of several bodies.
+        motion: segments (..., S, 3 or 4); with several bodies, `motion.body` holds their rows.
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
     rows = _find_rows(body, motion.body, lead)
     capsules = _place_capsules(body, position, quaternion, rows)
     segments = _Segments(
-        flat(position, 2),
-        flat(quaternion, 2),
-        flat(motion.velocity_world, 2),
-        flat(motion.angular_velocity_world, 2),
+        flatten_axes(position, 2),
+        flatten_axes(quaternion, 2),
+        flatten_axes(motion.velocity_world, 2),
+        flatten_axes(motion.angular_velocity_world, 2),
     )
     offset = body.joint_offset.reshape(-1, n_joints, 3)
     joints, velocity = np.empty((2, *lead, n_joints, 3))
-    written = _Joints(flat(joints, 2), flat(velocity, 2))
+    written = _Joints(flatten_axes(joints, 2), flatten_axes(velocity, 2))
     _write_joints(segments, rows, body.joint_segment, offset, written)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
@@ -145,9 +145,9 @@ def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> 
     """Return the capsules (B, T, W, K, 2, 3) of bodies along a path [m].
 
     Args:
-        body: measures of one body, or of several.
+        body: measurements of one body or of several bodies.
         path: path of the segments, arrays (B, T, W, S, ...).
-        which: row (B, W) of each worker's body, if there are several.
+        which: row (B, W) of each worker's body; required if `body` holds several bodies.
     """
     position = path.position_world
     over_time = None if which is None else np.asarray(which)[..., None, :]
@@ -156,7 +156,7 @@ def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> 
 
 
 def _find_rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
-    """Return the row (count,) of every body in motion."""
+    """Return the row (count,) in the pool of bodies for every moving body."""
     rows, last = np.zeros(lead, np.int64), len(body.names) - 1
     if which is not None and last > 0:
         if which.size and not 0 <= which.min() <= which.max() <= last:
@@ -171,21 +171,28 @@ def _place_capsules(
     """Return the capsules (..., K, 2, 3) of bodies.
 
     Args:
-        body: measures of one body, or of several.
+        body: measurements of one body or of several bodies.
         position: origins (..., S, 3) of the segments [m].
         quaternion: orientations (..., S, 4) of the segments.
-        rows: row (count,) of every body in motion.
+        rows: row (count,) in the pool of bodies for every moving body.
     """
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
     shape = (len(body.capsule_segment), 2, 3)
     ends = np.empty((len(rows), *shape))
     known = body.capsule_ends.reshape(-1, *shape)
-    _write_capsules(flat(position, 2), flat(quaternion, 2), rows, body.capsule_segment, known, ends)
+    _write_capsules(
+        flatten_axes(position, 2),
+        flatten_axes(quaternion, 2),
+        rows,
+        body.capsule_segment,
+        known,
+        ends,
+    )
     return ends.reshape(*position.shape[:-2], *shape)
 
 
 class _Segments(NamedTuple):
-    """Segments of N bodies in motion, in the world."""
+    """Poses and velocities of the segments of N moving bodies, in the world frame."""
 
     position: Points3
     """Origins (N, S, 3) [m]."""
@@ -198,7 +205,7 @@ class _Segments(NamedTuple):
 
 
 class _Joints(NamedTuple):
-    """Joints of N bodies in motion, in the world."""
+    """Joints of N moving bodies, in the world frame."""
 
     position: Points3
     """Positions (N, J, 3) [m]."""
@@ -210,7 +217,7 @@ class _Joints(NamedTuple):
 def _write_joints(
     segments: _Segments, rows: Ints, joint_segment: Ints, joint_offset: Floats, joints: _Joints
 ) -> None:  # pragma: no cover - compiled
-    """Write joints and the velocities at which their segments carry them, v + omega x r.
+    """Compute the positions of joints and their velocities v + omega x r on their segments.
 
     Args:
         segments: segments of N bodies.
@@ -242,7 +249,7 @@ def _write_capsules(
     capsule_ends: Floats,
     capsules: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Write both ends of the capsules of bodies.
+    """Compute the end points of the capsules of bodies.
 
     Args:
         position: origins (N, S, 3) of the segments [m].
@@ -263,14 +270,14 @@ def _write_capsules(
 
 
 def find_baked(name: str) -> Path:
-    """Return the file of a worker; `ConfigError` if none of that name was baked."""
+    """Return the path of a baked worker's file; raise `ConfigError` if the name is unknown."""
     if name not in worker_names():
-        raise unknown("worker", name, worker_names())
+        raise make_unknown_name_error("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 
 def freeze(array: np.ndarray, dtype: type) -> np.ndarray:
-    """Return a read-only copy of an array, as bodies are shared."""
+    """Return a read-only copy of an array; bodies are shared between callers."""
     copy = np.array(array, dtype=dtype)
     copy.setflags(write=False)
     return copy

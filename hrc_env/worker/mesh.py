@@ -1,4 +1,4 @@
-"""The appearance of a worker: textured surfaces that follow the segments, and a hard hat."""
+"""Appearance of a worker: textured surfaces that follow the segments, and a hard hat."""
 
 import functools
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ class SkinMesh:
     uv: Floats
     """Texture coordinates (V, 2) in [0, 1], v = 0 at the texture's first row."""
     weights: Floats
-    """Share (V, S) of each segment; at most four a vertex, rows sum to 1."""
+    """Skinning weights (V, S) of the segments; at most four per vertex, and rows sum to 1."""
     texture: NDArray[np.uint8]
-    """Texture (H, W, 3), RGB."""
+    """RGB texture (H, W, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +37,12 @@ class HatMesh:
     faces: Ints
     """Triangles (F, 3)."""
     rgb: tuple[float, float, float]
-    """Colour in [0, 1]."""
+    """RGB colour, with components in [0, 1]."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerMesh:
-    """The surfaces of a worker, which `scene` draws."""
+    """Surfaces of a worker for rendering."""
 
     skins: tuple[SkinMesh, ...]
     """Textured surfaces."""
@@ -52,7 +52,7 @@ class WorkerMesh:
 
 @functools.cache
 def load_mesh(name: str = "worker_1") -> WorkerMesh:
-    """Read surfaces and textures of a baked worker; `ConfigError` if there is none."""
+    """Read the surfaces of a baked worker; raise `ConfigError` if the name is unknown."""
     with np.load(find_baked(name)) as baked:
         return WorkerMesh(
             tuple(_read_skin(baked, skin) for skin in ("skin", "cloth")), _read_hat(baked)
@@ -87,14 +87,14 @@ def _read_hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
 
 
 def _read_texture(baked: np.lib.npyio.NpzFile, name: str) -> NDArray[np.uint8]:
-    """Return palette colours, darkened by the coarse map of shades (creases, folds)."""
+    """Return the texture: palette colours darkened by a coarse shading map (creases, folds)."""
     colours = baked[f"{name}_palette"][baked[f"{name}_paint"]].astype(np.float32)
     shade = _enlarge(baked[f"{name}_shade"].astype(np.float32) / 200.0, colours.shape[:2])
     return freeze(np.clip(colours * shade[..., None], 0.0, 255.0), np.uint8)
 
 
 def _enlarge(image: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """Return an image (h, w) as a larger one (H, W), bilinear, pixel centres at half-integers."""
+    """Enlarge an image (h, w) to (H, W) bilinearly, with pixel centres at half-integers."""
     for axis in (0, 1):
         size, old = shape[axis], image.shape[axis]
         at = np.clip((np.arange(size) + 0.5) * old / size - 0.5, 0, old - 1)

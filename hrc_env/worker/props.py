@@ -1,7 +1,7 @@
 """Props that workers hold: shapes and grips of tools, boards, boxes and carts.
 
-A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright, with
-the origin in the fist, between two hands, or on the floor below.
+While a prop is held upright in front of the body, the axes of its frame are the worker's (x
+forward, y left, z up). Its origin is in the fist, midway between two hands, or on the floor below.
 """
 
 from collections.abc import Sequence
@@ -25,19 +25,19 @@ from hrc_env.geometry.shapes import (
 )
 
 Xyz = Sequence[float]
-"""Three coordinates of a prop's frame [m]."""
+"""Three coordinates in a prop's frame [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prop:
-    """A thing that can be held, in its own frame."""
+    """An object that can be held, described in its own frame."""
 
     name: str
     """Name of the prop."""
     shapes: Floats
-    """Solid parts (G, `shapes.WIDTH`), capsules and boxes [m]."""
+    """Solid parts (G, `shapes.WIDTH`): capsules and boxes [m]."""
     grips: Points3
-    """Grips (2, 3) of the left and the right hand [m]; NaN for a hand that does not hold it."""
+    """Grip points (2, 3) of the left and the right hand [m]; NaN for a hand that is not used."""
 
 
 def _make_box(centre: Xyz, size: Xyz) -> Floats:
@@ -58,11 +58,11 @@ def _make_rod(start: Xyz, end: Xyz, radius: float) -> Floats:
 
 
 def _make_prop(name: str, parts: Sequence[Floats], left: Xyz | None, right: Xyz | None) -> Prop:
-    """Return a prop.
+    """Return a prop with read-only arrays.
 
     Args:
-        name: its name.
-        parts: its parts, rows of `shapes`.
+        name: name of the prop.
+        parts: solid parts of the prop, as rows of `shapes`.
         left: grip of the left hand; None if it does not hold the prop.
         right: grip of the right hand; None if it does not hold the prop.
     """
@@ -77,7 +77,7 @@ def _make_prop(name: str, parts: Sequence[Floats], left: Xyz | None, right: Xyz 
 ORIGIN = (0, 0, 0)
 PROPS: tuple[Prop, ...] = (
     _make_prop("nothing", [], None, None),
-    _make_prop(  # its handle stands up from the fist, the face that strikes looks ahead
+    _make_prop(  # the handle points up from the fist, and the striking face forward
         "hammer",
         [
             _make_rod((0, 0, -0.06), (0, 0, 0.24), 0.015),
@@ -86,7 +86,7 @@ PROPS: tuple[Prop, ...] = (
         None,
         ORIGIN,
     ),
-    _make_prop(  # cordless: the bit points ahead, above the fist
+    _make_prop(  # cordless: the bit points forward, above the fist
         "drill",
         [
             _make_rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
@@ -97,7 +97,7 @@ PROPS: tuple[Prop, ...] = (
         None,
         ORIGIN,
     ),
-    _make_prop(  # a hand saw: the blade runs ahead from the fist, its teeth down
+    _make_prop(  # a hand saw: the blade points forward from the fist, its teeth down
         "saw",
         [
             _make_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)),
@@ -106,7 +106,7 @@ PROPS: tuple[Prop, ...] = (
         None,
         ORIGIN,
     ),
-    _make_prop(  # drawn out half a metre from the right hand, its end in the left
+    _make_prop(  # drawn out by half a metre from the right hand, its end in the left
         "tape_measure",
         [
             _make_box((0, -0.25, 0), (0.07, 0.045, 0.07)),
@@ -145,16 +145,16 @@ PROPS: tuple[Prop, ...] = (
         (0, 0.28, 0.685),
         (0, -0.28, 0.685),
     ),
-    # A spirit level, flat to a wall ahead, in both hands.
+    # A spirit level in both hands, flat against a wall ahead.
     _make_prop("level", [_make_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
-    # A piece of a stud, flat, by its ends.
+    # A piece of a stud, flat, held at its ends.
     _make_prop("stud", [_make_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
 )
-"""All props; the first one stands for nothing."""
+"""All props; the first one stands for empty hands."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
 """Names of the props."""
 BOUNDS_M = np.zeros((len(PROPS), 2, 3))
-"""Least and greatest corner (P, 2, 3) of the box around each prop, in its own frame [m]."""
+"""Minimum and maximum corner (P, 2, 3) of each prop's bounding box, in the prop's frame [m]."""
 for _row, _each in zip(BOUNDS_M[1:], PROPS[1:], strict=True):
     _row[:] = bounds(_each.shapes)
 _N_PARTS = max(len(prop.shapes) for prop in PROPS)
@@ -165,10 +165,9 @@ for _parts, _each in zip(_PARTS, PROPS, strict=True):
 
 
 def held_shapes(held: Held) -> Floats:
-    """Return the solid parts (B, W n, `shapes.WIDTH`) of props in the hands or lying about [m].
+    """Return the solid parts (B, W n, `shapes.WIDTH`) of props that are held or at rest [m].
 
-    There are n rows a prop, as many as the prop with the most parts has; unused rows are absent
-    shapes.
+    Each prop has n rows, the largest number of parts of any prop; unused rows are absent shapes.
     """
     return place_shapes(held.kind, held.position_world, held.quaternion_wxyz, _PARTS)
 
@@ -176,13 +175,13 @@ def held_shapes(held: Held) -> Floats:
 def place_shapes(
     kind: Ints, position_world: Points3, quaternion_wxyz: QuaternionsWxyz, parts: Floats
 ) -> Floats:
-    """Return parts of things in the world (B, W n, `shapes.WIDTH`) [m].
+    """Return the parts (B, W n, `shapes.WIDTH`) of objects, in the world frame [m].
 
     Args:
-        kind: kind (B, W) of each thing.
-        position_world: its position (B, W, 3) [m].
-        quaternion_wxyz: its orientation (B, W, 4).
-        parts: parts (P, n, `shapes.WIDTH`) of every kind in its own frame [m].
+        kind: kind (B, W) of each object, a row of `parts`.
+        position_world: position (B, W, 3) of each object [m].
+        quaternion_wxyz: orientation (B, W, 4) of each object.
+        parts: parts (P, n, `shapes.WIDTH`) of objects of every kind, in the object's frame [m].
     """
     batch, many = kind.shape
     rows = np.empty((batch, many * parts.shape[1], WIDTH))
@@ -194,7 +193,7 @@ def place_shapes(
 def _place_parts(
     kind: Ints, position: Floats, quaternion: Floats, parts: Floats, rows: Floats
 ) -> None:
-    """Write the parts of props in the world.
+    """Transform the parts of props to the world frame.
 
     Args:
         kind: kind (B, W) of each prop.

@@ -109,7 +109,7 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import sample_floor as floor_points
 from hrc_env.scene.robot import ROBOTS, make_chain
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.reach import MIDDLE
 from hrc_env.tasks.task import find_task
@@ -545,7 +545,7 @@ def _records() -> dict[str, Any]:
                 walk(f"{place}/{field.name}", getattr(record, field.name))
 
     for env_id in ENV_IDS:
-        walk(env_id, settle(task=env_id, config={}).config)
+        walk(env_id, resolve_settings(task=env_id, config={}).config)
     for name, spec in ESTIMATORS.items():
         if spec.config is not None:
             walk(name, spec.config())
@@ -2584,7 +2584,7 @@ def start_near(home: NDArray[np.float64], spread: NDArray[np.float64], seeds: li
 
 def start_apart(n: int, seed: int, spread_rad: float, people: str) -> dict[str, NDArray[Any]]:
     """Return where robots begin that people leave room for, and how far apart they then are."""
-    simulation = Simulation(n, settle(perception="none", people=people))
+    simulation = Simulation(n, resolve_settings(perception="none", people=people))
     rngs = [np.random.default_rng([seed, b]) for b in range(n)]
     ids, chain, state = np.arange(n), simulation.chain, simulation.motion
     home = np.tile(np.zeros(chain.n_joints), (1, 1))[0]

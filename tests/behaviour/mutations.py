@@ -13,8 +13,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 _MESSAGES = {
-    "warn", "print", "unknown", "needed", "check_shape", "check_fields", "check_names", "info",
-    "say", "isinstance", "debug", "warning", "dtype", "perf_counter", "import_module",
+    "warn", "print", "make_unknown_name_error", "require", "check_shape", "check_fields",
+    "check_names", "info", "say", "isinstance", "debug", "warning", "dtype", "perf_counter",
+    "import_module",
 }  # fmt: skip
 """Calls whose arguments are words for people, or kinds of things."""
 _ALLOCATORS = {

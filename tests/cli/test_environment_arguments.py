@@ -15,7 +15,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.env_words import EnvironmentArguments, read_cameras, read_config
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 OF_RENDER = {"render_mode", "width", "height", "render_markers", "overlay"}
 """What only `render` reads, which no command calls: films have a form of their own."""
@@ -49,7 +49,7 @@ def test_everything_said_reaches_the_environment():
     assert (simulation.perception, simulation.settings["estimator"]) == ("keypoints", "kalman")
     assert (simulation.scene.name, simulation.control) == ("site", "tool")
     assert list(simulation.settings["n_workers"]) == [1, 2]
-    assert config.motion.people != settle().config.motion.people
+    assert config.motion.people != resolve_settings().config.motion.people
     assert [(fault.kind, fault.max_amount) for fault in config.faults] == [("late", 0.2)]
     assert (config.reward.proximity, config.worker) == (0.5, "any")
     assert simulation.shield.keywords["config"] == ShieldConfig("ssm", margin_m=0.1)
@@ -79,7 +79,7 @@ def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
         "reward": {"smoothness": 2.0, "effort": 0.3},
         "worker": "any",
     }
-    assert settle(config=config).config.reward.smoothness == 2.0
+    assert resolve_settings(config=config).config.reward.smoothness == 2.0
 
 
 @pytest.mark.parametrize(

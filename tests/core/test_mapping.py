@@ -8,8 +8,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.mapping import from_mapping, plain
-from hrc_env.settings import settle
+from hrc_env.core.mapping import convert_to_plain, from_mapping
+from hrc_env.settings import resolve_settings
 
 EYE = [2.0, 2.0, 2.0]
 
@@ -47,7 +47,7 @@ def camera(**other):
 )
 def test_a_nested_value_that_cannot_work_is_called_by_its_path(config, said):
     with pytest.raises(ConfigError, match=said):
-        settle(config=config)
+        resolve_settings(config=config)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_nested_value_that_cannot_work_is_called_by_its_path(config, said):
 )  # fmt: skip
 def test_so_is_one_of_a_keyword_argument(refused, said):
     with pytest.raises(ConfigError, match=said):
-        settle(**refused)
+        resolve_settings(**refused)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def test_only_the_fields_themselves_are_called_by_their_path():
 
 
 def test_numbers_of_numpy_are_numbers():
-    config = settle(
+    config = resolve_settings(
         config={"task": {"radius_m": np.float32(0.25)}, "tracker": {"n_hypotheses": 2}}
     ).config
     assert config.task.radius_m == 0.25
@@ -93,6 +93,6 @@ def test_numbers_of_numpy_are_numbers():
 
 def test_plain_values_are_what_json_has():
     value = {"a": (np.int64(1), [Path("b.toml")]), "mode": AutoresetMode.SAME_STEP}
-    assert plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
-    assert plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
-    assert plain(len) is len
+    assert convert_to_plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
+    assert convert_to_plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
+    assert convert_to_plain(len) is len

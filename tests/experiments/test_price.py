@@ -37,7 +37,7 @@ from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.safety.shield import SHIELDS
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 
 TINY = Price(
@@ -248,7 +248,7 @@ def test_only_the_shield_is_told_other_covariances(monkeypatch):
         return wanted, {}
 
     monkeypatch.setitem(SHIELDS, "qp", note)
-    part = Simulation(1, settle(perception="truth"))
+    part = Simulation(1, resolve_settings(perception="truth"))
     part.reset(np.zeros(1, int), [np.random.default_rng(0)])
     now = part.belief
     Widened(2.0, -0.1)(now, np.zeros((1, 6)), 0.04)

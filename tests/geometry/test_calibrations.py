@@ -9,7 +9,7 @@ from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.geometry.cameras import image_from_pinhole, project
 from hrc_env.geometry.rotations import about_axis, from_rotation_vector, look_at
 from hrc_env.scene.rig import make_cameras
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 K = np.array([[905.0, 0.0, 948.0], [0.0, 912.0, 551.0], [0.0, 0.0, 1.0]])
 BROWN = (-0.21, 0.06, 0.001, -0.002, -0.004)
@@ -64,9 +64,9 @@ def test_a_camera_of_matrices_projects_as_opencv_does(k, distortion, fisheye):
 def test_mappings_and_rig_files_take_matrices_too(tmp_path):
     camera = CameraConfig.from_matrices("a", K, pose(1), (1920, 1080), BROWN)
     mapping = {"name": "a", "K": K, "distortion": BROWN, "T_world_from_cam": pose(1)}
-    assert settle(cameras=[mapping]).config.scene.cameras == (camera,)
+    assert resolve_settings(cameras=[mapping]).config.scene.cameras == (camera,)
     with pytest.raises(ConfigError, match=r"cameras\[0\]\.latency_ms.*latency_s"):
-        settle(cameras=[{**mapping, "latency_ms": 3}])
+        resolve_settings(cameras=[{**mapping, "latency_ms": 3}])
     path = tmp_path / "rig.toml"
     path.write_text(
         f'[[camera]]\nname = "a"\nK = {K.tolist()}\ndistortion = {list(BROWN)}\n'
@@ -122,7 +122,7 @@ def calibration(folder, *tables):
 
 def test_a_calibration_is_a_rig_whose_pixels_count_from_the_corner(tmp_path):
     path = calibration(tmp_path, *map(table, range(4)))
-    cameras = settle(cameras=str(path)).config.scene.cameras
+    cameras = resolve_settings(cameras=str(path)).config.scene.cameras
     assert [camera.name for camera in cameras] == ["c0", "c1", "c2", "c3"]
     for k, camera in enumerate(cameras):
         theirs = by_opencv(seen(pose(k)), pose(k), BROWN, False)

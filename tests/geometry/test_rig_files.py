@@ -12,7 +12,7 @@ from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS, describe_defects, find_visible, sample_workspace
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 ODD = replace(
     CameraConfig.from_make("gopro_hero8_wide", 'the "left" one\\', (1.0, -2.0, 2.25)),
@@ -59,11 +59,11 @@ def test_a_missing_file_is_refused(tmp_path):
 
 def test_cameras_are_names_places_records_or_a_file(tmp_path):
     write_rig(tmp_path / "rig.toml", (ODD,))
-    assert settle(cameras="lab_gopro").config.scene.cameras == RIGS["lab_gopro"]
-    assert settle(cameras=tmp_path / "rig.toml").config.scene.cameras == (ODD,)
-    assert settle(cameras=str(tmp_path / "rig.toml")).config.scene.cameras == (ODD,)
+    assert resolve_settings(cameras="lab_gopro").config.scene.cameras == RIGS["lab_gopro"]
+    assert resolve_settings(cameras=tmp_path / "rig.toml").config.scene.cameras == (ODD,)
+    assert resolve_settings(cameras=str(tmp_path / "rig.toml")).config.scene.cameras == (ODD,)
     mapping = {"name": "b", "eye_world": [0, 1, 2]}
-    settings = settle(cameras=[(1, 2, 2.5), ODD, mapping, np.array([1.0, 0, 2])])
+    settings = resolve_settings(cameras=[(1, 2, 2.5), ODD, mapping, np.array([1.0, 0, 2])])
     assert [camera.name for camera in settings.config.scene.cameras] == [
         "camera_1",
         ODD.name,
@@ -71,8 +71,8 @@ def test_cameras_are_names_places_records_or_a_file(tmp_path):
         "camera_4",
     ]
     assert settings.cameras is None
-    some = settle(cameras=("camera_2", 0))
-    assert (some.config, some.cameras) == (settle().config, ("camera_2", 0))
+    some = resolve_settings(cameras=("camera_2", 0))
+    assert (some.config, some.cameras) == (resolve_settings().config, ("camera_2", 0))
 
 
 @pytest.mark.parametrize(

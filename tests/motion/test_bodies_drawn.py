@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from assets.workers.poses import rest_motion
-from hrc_env.core.batching import mapped, one
+from hrc_env.core.batching import map_arrays, one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ABSENT, ACTIVITY, BODY
 from hrc_env.core.records import Roi, WorkerPath
@@ -16,7 +16,7 @@ from hrc_env.motion import generator
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
@@ -160,7 +160,7 @@ def test_a_picture_shows_the_body_that_is_there():
     some, window = ("worker_1", "worker_5", "worker_8"), Roi((950.0, 540.0), 520.0, 0.0)
     drawn, seen = CropRenderer(build(n_workers=1, bodies=some)), []
     for row, name in enumerate(some):
-        rest = mapped(rest_motion(load_body(name)), lambda array: array[None])
+        rest = map_arrays(rest_motion(load_body(name)), lambda array: array[None])
         place = rest.position_world + np.array([0.9, 0.3, 0.0])
         motion = dataclasses.replace(rest, position_world=place, body=np.array([row]))
         alone = CropRenderer(build(n_workers=1, bodies=name))
@@ -191,4 +191,4 @@ def rest_of(motion):
 )
 def test_bodies_that_there_are_not_are_refused_with_those_that_there_are(worker, words):
     with pytest.raises(ConfigError, match=words):
-        settle(config={"worker": worker})
+        resolve_settings(config={"worker": worker})

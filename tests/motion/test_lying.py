@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator, lying
 from hrc_env.motion import state as st
@@ -135,7 +135,7 @@ def test_what_lies_about_does_not_depend_on_other_environments_and_comes_back_wi
         for state, rngs in (many, few):
             generator.advance(state, rngs, 0.04, 1)
     np.testing.assert_array_equal(many[0].loads[:1], few[0].loads)
-    state, rngs = copied(few[0]), copied(few[1])
+    state, rngs = copy_arrays(few[0]), copy_arrays(few[1])
     for _ in range(500):
         later = [generator.advance(*each, 0.04, 1)[1].held for each in (few, (state, rngs))]
         np.testing.assert_array_equal(later[0].position_world, later[1].position_world)

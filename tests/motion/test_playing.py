@@ -26,7 +26,7 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import N_ROOTS
 from hrc_env.motion.traffic import find_meeting
 from hrc_env.motion.walk import plan_walk
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()
@@ -152,14 +152,16 @@ def test_motions_come_as_paths_or_clips(clip, tmp_path):
     path = tmp_path / "walk.npz"
     save_clip(clip, path)
     assert load_clip(path) == clip
-    by_path = settle(config={"motion": {"motions": [str(path)]}}).config
-    assert by_path == settle(motions=[path]).config
-    assert settle(motions=[clip]).config.motion.motions == (clip,)
-    assert settle(config=by_path, motions=None).config.motion is by_path.motion
+    by_path = resolve_settings(config={"motion": {"motions": [str(path)]}}).config
+    assert by_path == resolve_settings(motions=[path]).config
+    assert resolve_settings(motions=[clip]).config.motion.motions == (clip,)
+    assert resolve_settings(config=by_path, motions=None).config.motion is by_path.motion
     with pytest.raises(ConfigError, match=r"motions\[0\] must be a str, got 3"):
-        settle(motions=[3])
+        resolve_settings(motions=[3])
     with pytest.raises(ConfigError, match="There is no clip"):
-        generator.make_state(1, 1, BODY, settle(motions=[tmp_path / "none.npz"]).config.motion)
+        generator.make_state(
+            1, 1, BODY, resolve_settings(motions=[tmp_path / "none.npz"]).config.motion
+        )
 
 
 def test_the_same_seed_plays_the_same(clip):

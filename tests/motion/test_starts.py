@@ -8,7 +8,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator, starts
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 
@@ -56,14 +56,14 @@ def test_a_worker_who_leaves_no_room_is_drawn_again_and_if_nothing_helps_words_s
 
 @pytest.mark.parametrize("arguments", [{}, {"scene": "site", "n_workers": 2, "people": "hurried"}])
 def test_no_robot_begins_within_a_decimetre_of_a_worker(arguments):
-    simulation = Simulation(200, settle(perception="none", **arguments))
+    simulation = Simulation(200, resolve_settings(perception="none", **arguments))
     simulation.reset(np.arange(200), [seeding.np_random(40 + b)[0] for b in range(200)])
     truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
     arm = chains.capsules(simulation.chain, simulation.physics.q)
     radius_m = simulation.chain.capsule_radius_m
     gap_m = least_separation(arm, radius_m, truth.capsules_world, truth.capsule_radius_m).distance_m
     assert gap_m.min() >= starts.APART_M
-    one = Simulation(1, settle(perception="keypoints", **arguments))
+    one = Simulation(1, resolve_settings(perception="keypoints", **arguments))
     for b in np.argsort(gap_m.min(1))[:20].tolist():
         one.reset(np.arange(1), [seeding.np_random(40 + b)[0]])
         np.testing.assert_array_equal(one.physics.q[0], simulation.physics.q[b])

@@ -14,7 +14,7 @@ from hrc_env.perception.calibration import (
     VERSION,
     read_calibration,
 )
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 
 def changed(tmp_path, **changes):
@@ -49,7 +49,7 @@ def test_shares_of_errors_add_up_to_one():
 def test_a_file_of_another_version_is_refused_with_the_command_that_makes_a_new_one(tmp_path):
     path = changed(tmp_path, version=VERSION + 1)
     with pytest.raises(ConfigError, match=f"version {VERSION + 1}.*emulator.calibrate --out"):
-        settle(config={"emulator": {"calibration": str(path)}})
+        resolve_settings(config={"emulator": {"calibration": str(path)}})
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "\x00", '{"format": "something else"}'])
@@ -62,7 +62,7 @@ def test_a_broken_file_is_refused(tmp_path, text):
 
 def test_a_file_that_is_not_there_is_refused():
     with pytest.raises(ConfigError, match="cannot be read"):
-        settle(config={"emulator": {"calibration": "nowhere.json"}})
+        resolve_settings(config={"emulator": {"calibration": "nowhere.json"}})
 
 
 def test_a_missing_table_is_named(tmp_path):

@@ -7,7 +7,7 @@ results, robots, arguments and images of a `PoseTracker`, with everything in the
 import multiprocessing
 import os
 import traceback
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -95,9 +95,9 @@ def meet_robots(rng):
     from hrc_env.scene.robot import ROBOTS, find_robot
 
     arm = ROBOTS["ur10e_like"]
-    fields = [name for name in arm.__dataclass_fields__ if name != "name"]
-    values = {name: getattr(arm, name) for name in arm.__dataclass_fields__} | {"name": "mine"}
-    for name in rng.choice(fields, rng.integers(1, 3), replace=False):
+    values = {each.name: getattr(arm, each.name) for each in fields(arm)} | {"name": "mine"}
+    names = [name for name in values if name != "name"]
+    for name in rng.choice(names, rng.integers(1, 3), replace=False):
         values[name] = odd(rng)
     find_robot(values if rng.random() < 0.7 else odd(rng))
 

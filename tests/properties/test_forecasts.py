@@ -14,7 +14,7 @@ from figures import Figure
 from benchmarks.common import CHI2_95_3D, compute_normalized_square
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.intervals import bootstrap, estimate_ratio
 
@@ -44,7 +44,7 @@ class Forecasts:
             return None
         found = []
         for horizon_s in self.horizons_s:
-            later, moved = estimator.forecast(state, horizon_s), copied(state)
+            later, moved = estimator.forecast(state, horizon_s), copy_arrays(state)
             moved.trees["age_s"] -= horizon_s  # nobody is given up meanwhile
             estimator.predict(moved, horizon_s, [])
             parts = later.mean_world, later.cov_world, estimator.estimate(moved).mean_world

@@ -20,7 +20,7 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.perception.calibration import POSTURES
 from hrc_env.perception.outline import posture_of
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import EPISODE_STEPS
 from hrc_env.worker.body import worker_truth
@@ -34,7 +34,7 @@ SEEDS = range(49_000, 49_150)
 
 def watch(jobs: str, scene: str, seeds: range) -> NDArray[np.void]:
     """Return (T, B) looks at the one worker of an episode of each seed."""
-    settings = settle(perception="truth", scene=scene, config={"motion": {"jobs": jobs}})
+    settings = resolve_settings(perception="truth", scene=scene, config={"motion": {"jobs": jobs}})
     part = Simulation(len(seeds), settings)
     agent = make_agent("scripted", env_info(part))
     result = part.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])

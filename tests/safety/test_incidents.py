@@ -12,7 +12,7 @@ from hrc_env.safety import contact, incidents
 from hrc_env.safety.contact import contact_force
 from hrc_env.safety.cost import COMPONENTS, CostConfig
 from hrc_env.safety.incidents import KINDS, detect_incidents, make_history
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import load_body
@@ -140,7 +140,9 @@ def test_a_cost_of_other_parts_is_refused(components, words):
 
 def played(n_steps, batch=24, **arguments):
     """A simulation with a robot that heeds nobody, and its infos, the reset's first."""
-    simulation = Simulation(batch, settle(perception="none", people="unaware", **arguments))
+    simulation = Simulation(
+        batch, resolve_settings(perception="none", people="unaware", **arguments)
+    )
     agent = make_agent("scripted", env_info(simulation))
     ids, rngs = np.arange(batch), [np.random.default_rng(b) for b in range(batch)]
     results = [simulation.reset(ids, rngs)]
@@ -207,6 +209,6 @@ def test_a_batch_counts_what_its_environments_do_and_states_keep_it():
 
 
 def test_what_is_carried_hits_harder():
-    simulation = Simulation(1, settle(task="HRCPickPlace-v0", perception="none"))
+    simulation = Simulation(1, resolve_settings(task="HRCPickPlace-v0", perception="none"))
     assert 5.0 < simulation.model.mass_kg < 40.0
     assert simulation.model.load_kg == pytest.approx(0.5)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from assets.workers.poses import rest_motion
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError, RenderingError
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.geometry.cameras import project, projections, rays
@@ -85,7 +85,7 @@ def lab():
 def person() -> WorkerMotion:
     rest = rest_motion(load_body())
     moved = replace(rest, position_world=rest.position_world + np.array([0.9, 0.3, 0.0]))
-    return mapped(moved, lambda array: array[None])
+    return map_arrays(moved, lambda array: array[None])
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Robots that users bring are seen by cameras as distances count them, whoever made their MJCF."""
 
 import warnings
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import mujoco
 import numpy as np
@@ -134,7 +134,7 @@ def test_a_robot_given_directly_is_checked_as_a_registered_one_is():
 
 
 def _fields(robot):
-    return {name: getattr(robot, name) for name in robot.__dataclass_fields__ if name != "name"}
+    return {each.name: getattr(robot, each.name) for each in fields(robot) if each.name != "name"}
 
 
 def test_rods_hold_the_points_they_are_fitted_to():

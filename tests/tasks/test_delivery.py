@@ -130,11 +130,11 @@ def test_the_material_is_delivered_when_the_base_stands_in_its_zone():
     assert info["task/not_delivered"].tolist() == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("what", ["fixed", "people"])
+@pytest.mark.parametrize("what", ["obstacle", "people"])
 def test_who_hits_something_has_not_delivered(what):
     state = begun(at(0))
     x, y = SITE.grounds.robot_xy_m
-    struck = world((x - 0.4, y, 0.0)) if what == "fixed" else world(at(0), touched=True)
+    struck = world((x - 0.4, y, 0.0)) if what == "obstacle" else world(at(0), touched=True)
     for _ in range(3):  # one hit, however long it lasts
         step = moved(state, struck)
     assert not step["hit"][0]

@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, walk
 
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.cameras import pinhole, projections
 from hrc_env.geometry.rotations import about_axis
@@ -136,7 +136,7 @@ def test_a_covariance_that_is_none_any_more_is_repaired_or_the_track_given_up(na
                     array[some] = harm(array[some])
                 return array
 
-            mapped(state, spoil)
+            map_arrays(state, spoil)
         e.predict(state, DT, rngs)
         e.update(state, frame, rngs)
         if t != 20:

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.cameras import pinhole, project
@@ -148,7 +148,7 @@ def test_a_batch_gives_the_bits_of_one_and_a_copy_goes_on():
     actual = [turned(RIG[0], 0.05), *RIG[1:]]
     one, many = run(actual), run(actual, batch=3)
     np.testing.assert_array_equal(np.repeat(one, 3, 0), many)
-    assert copied(many).tobytes() == many.tobytes()
+    assert copy_arrays(many).tobytes() == many.tobytes()
     forget_monitor(many, np.array([1]))
     assert named(many) == [0]
     assert not many["suspected"][1].any()

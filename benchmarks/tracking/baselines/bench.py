@@ -1,11 +1,10 @@
 """The tracking benchmark with other libraries, on the same sequences.
 
-| library | method |
-
-The two filters follow the libraries' documentation: constant velocity, pixels as measurements, and
-a defence against outliers (a likelihood with outliers; a gate, with a new start of a joint that the
-gate has excluded). All receive every camera's pixels of every frame and the detector's true
-standard deviation. None can distinguish left from right.
+The two filters follow the documentation of their libraries: constant velocity, pixels as
+measurements, and protection against outliers (a likelihood with heavy tails in particles; a gate in
+filterpy, which restarts a joint that it has excluded). All libraries receive the pixels in every
+camera and frame, and the true standard deviation of the detector. None can distinguish left from
+right.
 """
 
 import time
@@ -40,22 +39,22 @@ OURS = (DEFAULT, DLT)
 N_QUICK = 1
 """Number of sequences per rig and condition in the quick form."""
 Played = Mapping[tuple[str, str], list[dict[str, float]]]
-"""Results of each sequence by rig and window, and name."""
+"""Results of each sequence, by rig and window and by name of the library."""
 
 
 @dataclass(frozen=True, slots=True)
 class BaselinesBench:
-    """The experiment, and the amount of data that is used."""
+    """The experiment, and its amount of data."""
 
     name = "bench baselines"
     depends = ("tracker",)
     n_seeds: int = 5
     """Number of sequences per rig and condition; these libraries take about a minute for each."""
     first_seed: int = 1000
-    """Seed of the first sequence."""
+    """Seed of the first sequence; it increases by one with each further sequence."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for numbers that cannot work."""
+        """Raise `ConfigError` if a number is invalid."""
         check_at_least_one(self, "n_seeds")
 
     @property
@@ -65,16 +64,16 @@ class BaselinesBench:
 
     @property
     def n_parts(self) -> int:
-        """Number of sequences of all libraries."""
+        """Number of parts, one for each library and sequence."""
         return len(RIGS) * len(CONDITIONS) * len(names()) * self.n_seeds
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables of a short run; "" if it is long enough."""
+        """Warning on the tables of a short run, or "" if it is long enough."""
         return describe_quick_run(self.n_seeds, find_durations()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         versions = {name: version(name) for name in LIBRARIES if is_installed(name)}
         return {"baselines": asdict(self), "versions": versions, "missing": list_missing()}
 
@@ -104,22 +103,21 @@ def is_installed(name: str) -> bool:
 
 
 def find_follow(name: str) -> Callable[[Floats, Points2, int], Points3]:
-    """Return the function of a library that estimates joints.
+    """Return the function that estimates joints with a library.
 
-    It returns joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2) and a seed.
-
+    It returns joints (T, J, 3) [m] from projections (C, 3, 4), pixels (T, C, J, 2) and a seed.
     Missing pixels are NaN.
     """
     return import_module(f"benchmarks.tracking.baselines.{name}").follow
 
 
 def names() -> list[str]:
-    """Return the names of the libraries that run."""
+    """Return the names of all participants: those in `OURS` and the installed libraries."""
     return [*OURS, *filter(is_installed, LIBRARIES)]
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """Return squared errors and time of each window of one sequence."""
+    """Compute the mean squared error and the time per update of each window of a sequence."""
     sequences = make_sequences(rig, condition, [seed])
     if name in LIBRARIES:
         find_follow(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
@@ -136,14 +134,14 @@ def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) ->
 
 
 def _joints(name: str, rig: Rig, sequences: Sequences, seed: int) -> Points3:
-    """Return the joints (T, J, 3) of a sequence with one person."""
+    """Estimate the joints (T, J, 3) in a sequence with one person."""
     if name in LIBRARIES:
         return find_follow(name)(rig.P, sequences.px[:, 0, :, 0], seed)
     return np.stack([mean[0, 0] for mean, _ in beliefs(name, rig, sequences, [seed])])
 
 
 def compute_metrics(played: Played) -> dict[str, Metric]:
-    """Return RMSE over all sequences with the best and the worst; microseconds per update."""
+    """Compute the RMSE over all sequences with the best and the worst, and times per update."""
     metrics: dict[str, Metric] = {}
     times: dict[str, list[float]] = {}
     for (row, name), parts in played.items():
@@ -156,7 +154,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the report with errors and times, and the missing libraries."""
+    """Return the report with errors, times, and missing libraries."""
     lines = [
         [row, *(format_number(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
@@ -172,12 +170,12 @@ def report(metrics: Metrics) -> Report:
 
 
 def list_missing() -> list[str]:
-    """Return the libraries that are missing."""
+    """Return the names of libraries that are not installed."""
     return [name for name in LIBRARIES if not is_installed(name)]
 
 
 def describe_missing() -> str:
-    """Return a sentence with the missing libraries and their installation."""
+    """Return a sentence on the missing libraries and their installation."""
     if not list_missing():
         return "All libraries are installed."
     return f"Not installed, so not run: {', '.join(list_missing())}. Get them with: {INSTALL}"

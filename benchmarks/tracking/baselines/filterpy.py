@@ -13,11 +13,11 @@ from hrc_env.core.typing import Bools, Floats, Points2, Points3
 GATE_SIGMA = 5.0
 """Number of standard deviations from the prediction beyond which pixels are ignored."""
 PATIENCE = 3
-"""Number of frames with views of which none fitted, after which a joint is restarted."""
+"""Number of consecutive frames that the gate rejects, after which a joint is restarted."""
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Return joints (T, J, 3) from px (T, C, J, 2), without randomness."""
+    """Estimate joints (T, J, 3) from pixels (T, C, J, 2); the seed is not used."""
     del seed
     start = first_joints(P, px)
     joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
@@ -25,7 +25,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """Return positions (T, 3) of a joint from px (T, C, 2)."""
+    """Estimate positions (T, 3) of a joint from pixels (T, C, 2)."""
     ukf, held, lost = _filter(start), start, 0
     track = []
     for frame in px:
@@ -36,7 +36,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
             if near.any():
                 R = SIGMA_PX**2 * np.eye(2 * int(near.sum()))
                 ukf.update(frame[near].ravel(), R=R, P=P[near])
-        except np.linalg.LinAlgError:  # the covariance is no longer one: begin where we are
+        except np.linalg.LinAlgError:  # the covariance is not positive definite: restart here
             ukf, near = _filter(held), seen
         lost = lost + 1 if seen.sum() >= 2 and near.sum() < 2 else 0
         if lost == PATIENCE:
@@ -50,7 +50,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
 
 
 def _gate(ukf: Any, P: Floats, frame: Points2) -> Bools:
-    """Return whether the prediction allows each camera's pixel (C,)."""
+    """Return a mask (C,) of cameras with a pixel near the predicted one."""
     kalman = import_module("filterpy.kalman")
     near = np.zeros(len(P), bool)
     for c in range(len(P)):

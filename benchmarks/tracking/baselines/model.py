@@ -1,4 +1,4 @@
-"""The motion and measurement model of a joint for filter libraries: constant velocity, pixels."""
+"""Model of a joint for filter libraries: motion of constant velocity, pixels as measurements."""
 
 import numpy as np
 
@@ -9,19 +9,19 @@ from hrc_env.core.typing import Floats, Points2, Points3
 ACCELERATION = 10.0
 """Spectral density of a joint's acceleration [m^2/s^3]."""
 START_STD_M, START_STD_M_S = 0.1, 1.0
-"""Standard deviations of position and velocity in the first frame."""
+"""Standard deviations of position [m] and velocity [m/s] in the first frame."""
 
 _STEP = np.array([[1.0, DT_S], [0.0, 1.0]])
 _NOISE = ACCELERATION * np.array([[DT_S**3 / 3, DT_S**2 / 2], [DT_S**2 / 2, DT_S]])
 F: Floats = np.asarray(np.kron(_STEP, np.eye(3)), float)
-"""Transition of constant velocity over one frame (6, 6); states are position, then velocity."""
+"""Transition matrix of constant velocity over one frame (6, 6), for (position, velocity)."""
 Q: Floats = np.asarray(np.kron(_NOISE, np.eye(3)), float)
-"""Process noise of a white acceleration over one frame (6, 6)."""
+"""Covariance of the process noise over one frame (6, 6), by white acceleration."""
 START_COV: Floats = np.diag([START_STD_M**2] * 3 + [START_STD_M_S**2] * 3)
 
 
 def first_joints(P: Floats, px: Points2) -> Points3:
-    """Return joints (J, 3) triangulated from the first frame in which two cameras see each."""
+    """Triangulate each joint (J, 3) in the first frame in which two cameras see it."""
     joints = np.zeros((px.shape[2], 3))
     for frame in px[::-1]:
         joints = triangulate_frame(P, frame[None], joints[None])[0]

@@ -1,4 +1,4 @@
-"""The bootstrap filter of particles, one for each joint (N. Chopin, MIT)."""
+"""The bootstrap filter of the library particles, one for each joint (N. Chopin, MIT)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,14 +13,14 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 N_PARTICLES = 1000
 FREEDOM = 3.0
-"""Degrees of freedom of the pixels' Student t distribution, with tails for gross errors.
+"""Degrees of freedom of the pixels' Student t distribution, with heavy tails for gross errors.
 
-With a flat density particles that are all outliers would drift away.
+With a flat density of outliers, particles that are all outliers would drift away.
 """
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Return joints (T, J, 3) from px (T, C, J, 2)."""
+    """Estimate joints (T, J, 3) from pixels (T, C, J, 2)."""
     start = first_joints(P, px)
     with _seed(seed):
         joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
@@ -29,7 +29,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
 
 @contextmanager
 def _seed(seed: int) -> Iterator[None]:
-    """Seed NumPy's global stream, from which the library draws, and restore it afterwards."""
+    """Seed NumPy's global generator, which the library uses, and restore it afterwards."""
     before = np.random.get_state()  # noqa: NPY002
     np.random.seed(seed)  # noqa: NPY002
     try:
@@ -39,7 +39,7 @@ def _seed(seed: int) -> Iterator[None]:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """Return positions (T, 3) of a joint from px (T, C, 2)."""
+    """Estimate positions (T, 3) of a joint from pixels (T, C, 2)."""
     particles = import_module("particles")
     moments = import_module("particles.collectors").Moments()
     model = import_module("particles.state_space_models").Bootstrap(
@@ -56,7 +56,7 @@ def _joint_model(P: Floats, start: Points3) -> Any:
     models = import_module("particles.state_space_models")
 
     class Pixels(distributions.ProbDist):
-        """Distribution of the pixels of the cameras that see the joint: Student's t."""
+        """Student t distribution of the pixels in the cameras that see the joint."""
 
         dim = 2 * len(P)
 
@@ -70,7 +70,7 @@ def _joint_model(P: Floats, start: Points3) -> Any:
             return np.where(np.isfinite(density), density, 0.0).sum(-1)
 
     class Joint(models.StateSpaceModel):
-        """Joint with constant velocity."""
+        """A joint that moves with constant velocity."""
 
         def PX0(self) -> Any:  # noqa: N802
             return distributions.MvNormal(loc=np.concatenate([start, np.zeros(3)]), cov=START_COV)

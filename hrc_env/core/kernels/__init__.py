@@ -1,4 +1,4 @@
-"""Compiled kernels: `@kernel` before a function.
+"""The decorator `@kernel`, which compiles functions.
 
     @kernel
     def grow(ages, dt): ...
@@ -6,8 +6,8 @@
     @kernel(makes_arrays=True)
     def pairs(n): return np.empty((n, 2))
 
-Kernels are compiled by numba without Python's lock, kept on disk (`cache`), and compiled before
-they are needed where that is known (`ahead`).
+Kernels are compiled by numba, release Python's global lock, are cached on disk (`cache`), and are
+compiled before they are needed if their signatures are recorded (`ahead`).
 """
 
 import importlib
@@ -22,9 +22,9 @@ from numba.core import config
 LEAN_WITH = ("0.68",)
 """Releases of numba with which `lean`, which depends on the compiler's internals, was tested."""
 UNTESTED = "hrc_env's compiler of kernels was not tested with numba"
-"""Beginning of the warning about another release."""
+"""Beginning of the warning about an untested release."""
 KERNELS: dict[str, Any] = {}
-"""Every kernel that was imported, by "module:name"."""
+"""All imported kernels, by "module:name"."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -45,16 +45,17 @@ def kernel(
     """Compile a function on its first call; division by zero gives infinity, as in NumPy.
 
     Args:
-        function: the function, typed; without it, the options for a decorator.
-        makes_arrays: whether it makes arrays or returns them; the compiler refuses one that does
-            without this option. In all others arrays are not counted by reference, which numba does
-            with two locked instructions for every row, a fifth of the tracker's time; they must not
-            call a kernel that returns an array, whose memory would never be freed.
-        fastmath: the liberties of the optimiser with sums and products (LLVM's flags).
-        forceinline: whether it becomes a part of its callers.
+        function: the function, with type annotations; if omitted, a decorator with these options is
+            returned.
+        makes_arrays: whether it creates or returns arrays; without this option the compiler rejects
+            a function that does. In all other kernels, arrays are not reference-counted, for which
+            numba needs two atomic instructions per row, a fifth of the tracker's time; these
+            kernels must not call a kernel that returns an array, whose memory would never be freed.
+        fastmath: permitted rearrangements of floating-point arithmetic (LLVM's flags).
+        forceinline: whether it is inlined into its callers.
 
-    Python passes named tuples as they are, at which numba looks longer than at plain tuples, the
-    longer the more fields they have.
+    When Python calls a kernel, numba inspects named tuples more slowly than plain tuples, in
+    proportion to their number of fields.
     """
     if function is None:
         return partial(
@@ -72,9 +73,9 @@ def kernel(
 
 
 def dispatcher(version: str) -> Any:
-    """Return the class of kernels for a release of numba.
+    """Return the dispatcher class of kernels for a release of numba.
 
-    Releases that were not tested get numba's own class, and one warning.
+    Untested releases get numba's own class, and a warning is issued once.
     """
     tested = version.startswith(tuple(f"{release}." for release in LEAN_WITH))
     if not tested:
@@ -89,4 +90,4 @@ def dispatcher(version: str) -> Any:
 
 
 DISPATCHER = dispatcher(numba.__version__)
-"""Class of every kernel in this process."""
+"""Dispatcher class of every kernel in this process."""

@@ -1,4 +1,4 @@
-"""Compiles kernels before they are needed, on all cores."""
+"""Compilation of kernels before they are needed, on all cores."""
 
 import contextlib
 import json
@@ -21,8 +21,8 @@ log = logging.getLogger("hrc_env.core.kernels")
 Say = Callable[[float, str], None]
 """A function of (added share, current activity) that shows progress."""
 AT_ONCE_S = 3.0
-"""Compile time below which a kernel is compiled on its first call [s]: a process takes as long to
-start."""
+"""Compile time below which a kernel is compiled on its first call [s]; starting a process takes
+about as long."""
 LOG_EVERY_S = 10.0
 
 
@@ -33,18 +33,18 @@ def missing(level: str | None = None) -> list[Signature]:
 
 @lru_cache(maxsize=8)
 def ensure(level: str) -> None:
-    """Compile the kernels of a perception level unless they lie on disk.
+    """Compile the kernels of a perception level that are not cached on disk.
 
-    The progress goes to the log.
+    The progress is logged.
     """
     if sum(each.seconds for each in missing(level)) > AT_ONCE_S:
         compile_missing(level, _logged())
 
 
 def compile_missing(level: str | None, say: Say) -> int:
-    """Compile missing kernels in one process a core, and return their number.
+    """Compile missing kernels in one process per core, and return their number.
 
-    Where no process can be started, or one dies, kernels are compiled on their first call.
+    Kernels are compiled on their first call instead if a process cannot be started or dies.
     """
     with alone(folder(), lambda: say(0.0, "waiting for another program that compiles")):
         todo = missing(level)
@@ -57,9 +57,9 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 
 def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
-    """Let one process compile until no kernels are left.
+    """Let one child process compile kernels until none are left.
 
-    Other processes take from the same kernels.
+    Other child processes take kernels from the same iterator.
     """
     quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
     command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
@@ -70,7 +70,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
         log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
         return
     for each in wanted:
-        with contextlib.suppress(OSError):  # of a process that has died
+        with contextlib.suppress(OSError):  # raised for a process that has died
             process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
         answer = process.stdout.readline()
         if answer != "done\n":
@@ -100,16 +100,16 @@ def _logged() -> Say:
 
 
 def main() -> None:
-    """Compile the kernels that lines of JSON [kernel, args] name, and answer each.
+    """Compile the kernels named by lines of JSON [kernel, args], and acknowledge each of them.
 
-    `_serve` starts this function.
+    `_serve` starts this function in a child process.
     """
     for line in sys.stdin:
         name, args = json.loads(line)
         try:
             kernel_named(name).compile(tuple(decode(each) for each in args))
             answer = "done"
-        except Exception as error:  # numba has many: it has other arguments, or another name, now
+        except Exception as error:  # of many kinds: the kernel's arguments or name have changed
             answer = f"failed: {error!r}".replace("\n", " ")
         sys.stdout.write(f"{answer}\n")
         sys.stdout.flush()

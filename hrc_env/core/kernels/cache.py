@@ -1,11 +1,11 @@
-"""Compiled kernels on disk: one file for each kernel, signature and processor.
+"""Disk cache of compiled kernels: one file for each kernel, signature and processor.
 
 numba's own cache depends on the modification time of a function's file: a copied tree is compiled
-again, and a change of a callee in another file is missed. Here the name of a file holds a digest of
-everything that the kernel depends on (`digest`), so that a file that is found always fits.
+again, and a change of a callee in another file is missed. Here the file name contains a digest of
+everything on which the kernel depends (`digest`); a file that is found is therefore always valid.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import contextlib
@@ -35,8 +35,8 @@ SUFFIX = ".nbc"
 def folder() -> Path:
     """Return the folder of compiled kernels.
 
-    It is NUMBA_CACHE_DIR if that is set; else a folder beside the package's bytecode, so that a
-    copied tree keeps them; where that is read-only, one in the user's caches.
+    It is NUMBA_CACHE_DIR if that is set; otherwise a folder beside the package's bytecode, which is
+    copied together with the tree; if that is read-only, one in the user's cache.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
@@ -56,13 +56,13 @@ def _hashed(text: str) -> str:
 
 
 class KernelCache(NullCache):
-    """The compiled forms of one kernel."""
+    """Cache of the compiled forms of one kernel."""
 
     def __init__(self, dispatcher: Dispatcher) -> None:
         self._dispatcher = dispatcher
 
     def path(self, args: tuple[Any, ...]) -> Path:
-        """Return the file of a signature."""
+        """Return the path of the file for a signature."""
         context: Any = self._dispatcher.targetctx
         processor = context.codegen().magic_tuple()
         kind = _hashed(repr((str(args), processor)))[:10]
@@ -78,7 +78,7 @@ class KernelCache(NullCache):
     def load_overload(  # type: ignore[override]
         self, sig: Any, target_context: Any
     ) -> CompileResult | None:
-        """Return a compiled form; None: there is none."""
+        """Return a compiled form, or None if it is not cached."""
         target_context.refresh()
         try:
             parts = pickle.loads(self.path(_args(sig)).read_bytes())
@@ -87,9 +87,9 @@ class KernelCache(NullCache):
         return CompileResult._rebuild(target_context, *parts)
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:  # type: ignore[override]
-        """Keep a compiled form, if files can be written.
+        """Save a compiled form if files can be written.
 
-        Older forms are removed, but not from NUMBA_CACHE_DIR, which several checkouts may share.
+        Older forms are removed, except from NUMBA_CACHE_DIR, which several checkouts may share.
         """
         path = self.path(_args(sig))
         draft = path.with_name(f"{uuid.uuid4().hex}.tmp")

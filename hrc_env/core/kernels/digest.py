@@ -1,9 +1,10 @@
-"""The digest of a kernel.
+"""Digests of kernels.
 
-It covers the module, bytecode, options and constants of the kernel, and all kernels that it calls.
+A digest covers the module, bytecode, options and constants of the kernel, and all kernels that it
+calls.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import dis
@@ -17,11 +18,11 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 
 LOADS_CONSTANT = frozenset(dis.hasconst)
-"""Instructions with the place of a constant as their argument."""
+"""Instructions whose argument is the index of a constant."""
 
 
 def digest_of(dispatcher: Dispatcher) -> str:
-    """The digest of a kernel; of values as they are when it is first asked for."""
+    """Return the digest of a kernel, with the values of globals at the time of the first call."""
     known: dict[str, Any] = vars(dispatcher)
     if "_digest" not in known:
         known["_digest"] = "itself"  # where a kernel calls itself
@@ -33,7 +34,7 @@ def digest_of(dispatcher: Dispatcher) -> str:
 
 
 def _function(function: Any) -> list[str]:
-    """Return texts of a function's code and of the values that it names."""
+    """Return strings that describe a function's code and the values of the names in it."""
     codes, names = [function.__code__], set()
     parts = [repr(function.__defaults__)]
     for code in codes:
@@ -49,9 +50,9 @@ def _function(function: Any) -> list[str]:
 
 
 def _instructions(code: types.CodeType) -> tuple[bytes, list[Any]]:
-    """Return the bytecode without places of constants, and the constants in order of loading.
+    """Return the bytecode without indices of constants, and the constants in order of loading.
 
-    A docstring shifts the places of other constants, and no instruction loads it.
+    A docstring shifts the indices of other constants, and no instruction loads it.
     """
     bytecode, loaded, high = bytearray(code.co_code), [], 0
     for k in range(0, len(bytecode), 2):
@@ -64,7 +65,7 @@ def _instructions(code: types.CodeType) -> tuple[bytes, list[Any]]:
 
 
 def _value(value: Any, names: set[str]) -> str:
-    """Return a digest or a text of a value."""
+    """Return a digest or textual form of a value."""
     if isinstance(value, Dispatcher):
         return digest_of(value)
     if isinstance(value, types.ModuleType):

@@ -1,15 +1,15 @@
-"""A cheaper way through numba's compiler: callees are lowered, only the kernel itself is compiled.
+"""A faster way through numba's compiler: callees are only lowered, callers are compiled.
 
 numba links, optimises and emits the code of every callee again at every level of calls. Here a
-callee is left in LLVM's intermediate form; the kernel that Python calls links each of them once,
-optimises once and emits once, in half the time and memory.
+callee is left in LLVM's intermediate form; the kernel that Python calls links every callee once,
+optimises once and emits code once, in half the time and memory.
 
-Everything is done by subclasses, so that other numba functions are compiled as usual. The
-subclassed classes are internals of numba: releases other than the tested ones (`LEAN_WITH`) get
-`plain`.
+Everything is implemented in subclasses, which leaves the compilation of other numba functions
+unchanged. The base classes are internals of numba: releases other than the tested ones
+(`LEAN_WITH`) use `plain`.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import copy
@@ -25,15 +25,15 @@ from hrc_env.core.kernels.cache import KernelCache
 
 
 class LeanLibrary(codegen.JITCodeLibrary):
-    """The code of one function.
+    """Code of one function.
 
-    That of a kernel is compiled; that of a callee is kept for its callers.
+    The code of a kernel is compiled; that of a callee is kept for its callers.
     """
 
     _is_callee = False
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Compile, and return the address of the wrapper that Python calls; 0 for a callee."""
+        """Compile the code; return the address of the wrapper that Python calls, 0 for a callee."""
         if not self._finalized and name not in {each.name for each in self._final_module.functions}:
             self.keep_as_callee()
         return 0 if self._is_callee else super().get_pointer_to_function(name)
@@ -87,7 +87,7 @@ class LeanLibrary(codegen.JITCodeLibrary):
 
 
 class LeanContext(cpu.CPUContext):
-    """numba's own context with another way to compile libraries."""
+    """CPU context of numba with another way to compile libraries."""
 
     def get_executable(self, library: LeanLibrary, fndesc: Any, env: Any) -> Any:
         """Return the function that Python calls; for a callee, a placeholder."""
@@ -107,25 +107,25 @@ def _lean_context() -> LeanContext:
     context = LeanContext.__new__(LeanContext)
     context.__dict__.update(usual.__dict__)
     context._internal_codegen = generator
-    context.cached_internal_func = {}  # what is kept as a callee is not for numba's own functions
+    context.cached_internal_func = {}  # numba's own functions must not use callees
     return context
 
 
 class LeanTarget(registry.CPUTarget):
-    """numba's own target with the lean context."""
+    """CPU target of numba with the lean context."""
 
     target_context: Any = property(lambda self: _lean_context())  # type: ignore[override]
     typing_context: Any = property(lambda self: registry.cpu_target.typing_context)  # type: ignore[override]
 
 
 class CalleeDispatcher(registry.CPUDispatcher):
-    """A kernel as other kernels call it."""
+    """Dispatcher of a kernel that is called by other kernels."""
 
     targetdescr = LeanTarget("cpu")
 
 
 class KernelDispatcher(registry.CPUDispatcher):
-    """A kernel as Python calls it, kept on disk; other kernels call its `callee`."""
+    """Dispatcher of a kernel that Python calls, cached on disk; other kernels call its `callee`."""
 
     targetdescr = LeanTarget("cpu")
 

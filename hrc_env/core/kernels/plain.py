@@ -1,7 +1,7 @@
 """The usual way through numba's compiler, for releases with which `lean` was not tested.
 
-Callees are compiled at every level of calls: kernels take about twice as long to compile, and run
-as fast.
+Callees are compiled at every level of calls: kernels take about twice as long to compile and run
+equally fast.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from hrc_env.core.kernels.cache import KernelCache
 
 
 class PlainDispatcher(registry.CPUDispatcher):
-    """A kernel as Python and other kernels call it, kept on disk."""
+    """Dispatcher of a kernel that Python and other kernels call, cached on disk."""
 
     def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, targetoptions=targetoptions)

@@ -3,7 +3,7 @@
 `python -m assets.kernels.record` writes the file.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import importlib
@@ -28,21 +28,21 @@ class Signature:
     """A kernel with the types of the arguments that it is called with."""
 
     kernel: str
-    """"module:name"."""
+    """Name of the kernel, as "module:name"."""
     args: list[Any]
-    """Types of the arguments, as `encode` writes them."""
+    """Types of the arguments, as `encode` returns them."""
     levels: list[str]
-    """Perception levels that call it."""
+    """Perception levels that call the kernel."""
     seconds: float
-    """Time to compile it when this was recorded [s]; it determines the order and the remaining
-    time."""
+    """Recorded compile time of the kernel [s]; it determines the order of compilation and the
+    estimated remaining time."""
 
     def types(self) -> tuple[Any, ...]:
-        """Return the types as numba's."""
+        """Return the argument types as types of numba."""
         return tuple(decode(each) for each in self.args)
 
     def is_compiled(self) -> bool:
-        """Return whether it lies on disk, or does not exist any more."""
+        """Return whether the kernel is cached on disk or no longer exists."""
         try:
             return kernel_named(self.kernel)._cache.path(self.types()).exists()
         except (ImportError, KeyError, AttributeError):
@@ -50,26 +50,26 @@ class Signature:
 
 
 def kernel_named(name: str) -> Any:
-    """Return a kernel by "module:name"; its module is imported."""
+    """Import the module of a kernel named "module:name", and return the kernel."""
     importlib.import_module(name.partition(":")[0])
     return KERNELS[name]
 
 
 def recorded(level: str | None = None) -> list[Signature]:
-    """Return the signatures of a perception level (None: any), slowest to compile first."""
+    """Return the signatures of a perception level (None for all), slowest to compile first."""
     known = [Signature(**each) for each in json.loads(PATH.read_text())]
     return [each for each in known if level is None or level in each.levels]
 
 
 def write(signatures: Sequence[Signature]) -> None:
-    """Write the file, one line a signature."""
+    """Write signatures to the file, with one line for each."""
     ordered = sorted(signatures, key=lambda each: (-each.seconds, each.kernel, str(each.args)))
     lines = ",\n".join(json.dumps(asdict(each)) for each in ordered)
     PATH.write_text(f"[\n{lines}\n]\n")
 
 
 def encode(kind: Any) -> Any:
-    """Return a type of numba's as JSON.
+    """Return a numba type as JSON.
 
     It is "float64", "float64[3C]" ("!" after it: read-only), "module:DTYPE" for a record and
     "module:DTYPE[2C]" for a structured array, a list for a tuple, {"module:name": [...]} for a
@@ -95,7 +95,7 @@ def encode(kind: Any) -> Any:
 
 
 def decode(text: Any) -> Any:
-    """Return the type that `encode` wrote."""
+    """Return the numba type for the JSON form that `encode` returns."""
     if isinstance(text, list):
         return types.Tuple([decode(each) for each in text])
     if isinstance(text, dict):
@@ -114,7 +114,7 @@ def decode(text: Any) -> Any:
 
 
 def _name_of(record: types.Record) -> str:
-    """Return the module's constant that holds a record's dtype, as "module:DTYPE"."""
+    """Return the name "module:DTYPE" of the module's constant that holds a record's dtype."""
     dtype = as_dtype(record)
     for module in [name for name in sys.modules if name.startswith("hrc_env.")]:
         for name, value in vars(sys.modules[module]).items():

@@ -1,4 +1,4 @@
-"""An ablation: one question, and the settings that answer it."""
+"""Ablations, each of which compares settings to answer one question."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ class Setting:
     """The settings that all episodes of a row share: scene, workers, estimator and cameras."""
 
     name: str
-    """Name in results.json."""
+    """Name of the setting in results.json."""
     words: str
-    """Description in tables and figures."""
+    """Description of the setting in tables and figures."""
     scene: str = "lab"
     """Name of the scene."""
     n_workers: int = 1
@@ -30,10 +30,10 @@ class Setting:
     motion: str = "model"
     """Treatment of velocities, one of `handicaps.MOTION`."""
     turns: tuple[Turn, ...] = (Turn(),)
-    """Choices of cameras over which episodes rotate, so that no result depends on one camera's
-    place."""
+    """Choices of cameras over which episodes rotate, so that no result depends on the position of
+    one camera."""
     by_sight: bool = False
-    """Whether errors are also recorded by the number of cameras that see the joint."""
+    """Whether errors are also grouped by the number of cameras that see the joint."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if the setting cannot be played."""
@@ -49,30 +49,30 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """One question of the ablations."""
+    """An ablation, which answers one question."""
 
     name: str
-    """Name in results.json and on the command line."""
+    """Name of the ablation in results.json and on the command line."""
     title: str
-    """Title in the report."""
+    """Title of the ablation in the report."""
     question: str
-    """The question, and the episodes that answer it."""
+    """Question, and description of the episodes that answer it."""
     settings: tuple[Setting, ...]
     """Settings, one per row."""
     also: Mapping[str, str] = field(default_factory=dict)
     """Groups of joints that are also evaluated, with their descriptions."""
     against: tuple[str, ...] = ()
-    """Names of reference settings: each other setting of a scene is compared with the last one
-    before it."""
+    """Names of reference settings. Every other setting is compared with the last reference before
+    it in the same scene."""
 
     def find_setting(self, name: str) -> Setting:
-        """Return a setting by its name; raise `ConfigError` if there is none."""
+        """Return a setting by name, or raise `ConfigError` if it does not exist."""
         known = {setting.name: setting for setting in self.settings}
         check_names(f"setting of {self.name!r}", [name], known)
         return known[name]
 
     def find_reference(self, setting: Setting) -> str:
-        """Return the name of the setting to compare with, walk by walk; "" if there is none."""
+        """Return the name of the reference of a setting, or "" if there is none."""
         alike = [each for each in self.settings if each.scene == setting.scene]
         known = [k for k, each in enumerate(alike) if each.name in self.against]
         before = [k for k in known if k <= alike.index(setting)]

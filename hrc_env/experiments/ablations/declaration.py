@@ -31,7 +31,7 @@ COLUMNS = (
     Column("error_m.{}.median", "median [mm]", 1, 1000),
     Column("error_m.{}.p95", "95 % [mm]", 0, 1000),
 )
-"""Columns of the documentation and of the report."""
+"""Columns of the tables in the documentation and in the report."""
 MORE = (
     Column("difference.error_m.{}.median", "difference of median [mm]", 1, 1000, signed=True),
     Column("difference.error_m.{}.p95", "difference of 95 % [mm]", 0, 1000, signed=True),
@@ -39,12 +39,12 @@ MORE = (
     Column("coverage95.{}", "coverage [%]", 1, 100),
     Column("lost.{}", "lost [%]", 2, 100),
 )
-"""Further columns of the report."""
+"""Further columns of the tables in the report."""
 OF_SEVERAL = (
     Column("id_switches.{}", "switches [1/min]", 2),
     Column("idf1.{}", "IDF1 [%]", 1, 100),
 )
-"""Further columns of questions with several workers."""
+"""Further columns for questions with several workers."""
 _SHOWN = {
     "cameras": "n1 n2 n3 n4 n8 corners walls low one_side two_neighbours two_opposite two_beside",
     "algorithm1": "n1_m100 n1_m10000 sigma_1cm n1_m1000",
@@ -60,10 +60,10 @@ _SHOWN = {
 
 
 def make_table(seconds: float) -> Table:
-    """Return the table of the documentation.
+    """Return the table for the documentation.
 
     Args:
-        seconds: length of an episode [s].
+        seconds: duration of an episode [s].
     """
     return Table(
         "ablations",

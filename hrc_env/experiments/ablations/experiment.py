@@ -32,26 +32,26 @@ from hrc_env.experiments.runner import check_at_least_one, is_as_short, override
 from hrc_env.experiments.versions import make_key
 
 Played = Mapping[str, Mapping[str, Sums]]
-"""Sums by question and setting."""
+"""Sums over episodes, by question and setting."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ablations:
-    """The experiment, and the amount of data that is played."""
+    """The ablations and their settings."""
 
     name = "ablations"
     depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 30
     """Number of episodes per setting."""
     first_seed: int = 2_000_000
-    """Seed of the first episode; later ones count up."""
+    """Seed of the first episode; it increases by one with each further episode."""
     seconds: float = 10.0
-    """Length of an episode, including the warm-up [s]."""
+    """Duration of an episode, including the warm-up [s]."""
     studies: tuple[str, ...] = tuple(ABLATIONS)
-    """Names of the questions."""
+    """Names of the ablations to run."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for settings that cannot work."""
+        """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds")
         if not self.seconds > WARM_UP_S:
             raise ConfigError(
@@ -78,19 +78,19 @@ class Ablations:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """The warning on tables and figures of a short run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on.
+        """Return the settings on which all numbers depend.
 
-        The choice of questions changes none of them.
+        The choice of questions is not among them, because it changes no number.
         """
         return {name: value for name, value in asdict(self).items() if name != "studies"}
 
     def play(self, cache: PartCache) -> Played:
-        """Return every setting's sums; settings that share walks are played one after the other."""
+        """Return the sums of every setting; settings with the same walks are played in sequence."""
         order = sorted(
             (
                 (ablation.name, setting)
@@ -115,7 +115,7 @@ class Ablations:
         return compute_metrics(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table for the documentation."""
         return (make_table(self.seconds),)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
@@ -124,26 +124,26 @@ class Ablations:
 
 
 QUICK = Ablations(n_seeds=4, seconds=5.0)
-"""The quick form: every number, from few episodes."""
+"""The quick form, with few and short episodes."""
 
 
 def make_experiment(
     quick: bool = False, seeds: int | None = None, studies: Sequence[str] | None = None
 ) -> Ablations:
-    """Return the experiment with the settings of the command line; None keeps a default."""
+    """Return the experiment for the options of the command line; None keeps a default."""
     names = None if studies is None else tuple(dict.fromkeys(studies))
     return override(QUICK if quick else Ablations(), n_seeds=seeds, studies=names)
 
 
 def play_setting(config: Ablations, setting: Setting, tick: PartProgress) -> Sums:
-    """Return the sums of one setting's episodes."""
+    """Play the episodes of a setting and return their sums."""
     n_steps = round(config.seconds / DT_S)
     walks = make_walks(setting.scene, setting.n_workers, config.seeds, n_steps)
     return play(setting, walks, config.seeds, tick)
 
 
 def compute_metrics(played: Played) -> dict[str, Metric]:
-    """Return all metrics by name; groups of joints that never occurred have none."""
+    """Return all metrics by name, without those of empty groups of joints."""
     metrics: dict[str, Metric] = {}
     for name, of_settings in played.items():
         for setting, sums in of_settings.items():
@@ -168,7 +168,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
 
 
 def _measure_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
-    """Return errors of joints, and the coverage of their reported uncertainty."""
+    """Return the errors of joints and the coverage of their reported uncertainty."""
     return {
         f"error_m.{key}.median": estimate_quantile(ERRORS_M, sums["errors"], 0.5, "m"),
         f"error_m.{key}.p95": estimate_quantile(ERRORS_M, sums["errors"], 0.95, "m"),
@@ -178,9 +178,9 @@ def _measure_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
 
 
 def _group_by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
-    """Return the sums of a scene's settings by the number of cameras that see a joint.
+    """Add up the sums of a scene's settings by the number of cameras that see a joint.
 
-    Their names are `<scene>_seen_<k>`; episodes of one seed count as one.
+    The names of the results are `<scene>_seen_<k>`; episodes with the same seed count as one.
     """
     groups: dict[str, dict[str, Any]] = {}
     for setting, sums in of_settings.items():

@@ -1,4 +1,4 @@
-"""Handicaps of a tracker: information added or removed before every image."""
+"""Changes to the state of a tracker that add or remove information before every image."""
 
 from typing import Any
 
@@ -8,21 +8,22 @@ from hrc_env.core.typing import Floats, Points3
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 BONES = ("learnt", "known", "none")
-"""Bone lengths: learnt by the filter; known, set to the true ones; or none, without any
-expectation."""
+"""Treatments of bone lengths: "learnt" by the filter, "known" (set to the true lengths), or "none"
+(without a prior)."""
 MOTION = ("model", "forgotten")
-"""Velocities: those of the filter's model; or forgotten after every image.
+"""Treatments of velocities: those of the filter's "model", or "forgotten" after every image.
 
-Forgotten velocities have the prior's spread, as in line 7 of the paper's Algorithm 1.
+Forgotten velocities have the standard deviation of a prior, as in line 7 of the paper's
+Algorithm 1.
 """
 TREES = ("particle", "kalman")
-"""Estimators that support these handicaps."""
+"""Estimators that support these treatments."""
 KNOWN_M2 = 1e-5
-"""Variance of a known length [m^2], the least that a filter may learn."""
+"""Variance of a known length [m^2], the smallest that a filter may learn."""
 UNKNOWN_M2 = 1e6
-"""Variance of a length without any expectation [m^2]."""
+"""Variance of a length without a prior [m^2]."""
 SPEED_MPS = 1.0
-"""Standard deviation of a forgotten velocity on each axis [m/s]; judgement."""
+"""Standard deviation of a forgotten velocity along each axis [m/s] (judgement)."""
 _PARENT = np.where(np.arange(len(PARENT)) == ROOT, ROOT, PARENT)
 
 
@@ -37,7 +38,7 @@ def compute_lengths_m(joints_world: Points3) -> Floats:
 
 
 def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
-    """Modify the state of a tracker of one of `TREES` in place before its next prediction.
+    """Modify the state of one of the `TREES` in place, before its next prediction.
 
     Args:
         state: state of the tracker.
@@ -58,9 +59,9 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
 
 
 def _forget_velocities(trees: Any) -> None:
-    """Reset velocities, and keep the marginal of all positions.
+    """Reset the velocities, and keep the marginal distribution of all positions.
 
-    The marginal is again a Gaussian on the tree.
+    The marginal distribution is again a Gaussian on the tree.
     """
     cov, slope = trees["cov"], trees["slope"]
     of_parent = cov[..., _PARENT, :, :]

@@ -1,6 +1,7 @@
-"""Episodes of a setting: detections and an estimator on walks, compared with the truth.
+"""Episodes of a setting, in which an estimator tracks workers and is compared with the truth.
 
-Workers walk once for all settings, beside an arm that rests and to which they do not react.
+The walks of the workers are computed once for all settings. Workers walk beside a resting arm, to
+which they do not react.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,11 +35,11 @@ from hrc_env.tracking.metrics import make_identities, measure_errors
 from hrc_env.worker.body import Body, load_bodies, select_bodies, worker_truth
 
 LEVEL = "keypoints"
-"""Perception level."""
+"""Perception level of all settings."""
 BODIES = "any"
-"""Bodies: every episode gives each worker one of the baked bodies."""
+"""Choice of bodies: in every episode, each worker has one of the baked bodies."""
 INSIDE_95 = float(chi2.ppf(0.95, 3))
-"""Squared Mahalanobis distance of the 95 % region of a position."""
+"""Squared Mahalanobis distance at the boundary of the 95 % region of a position."""
 Sums = dict[str, list[Any]]
 """Lists of sums by name, one value per episode."""
 
@@ -48,16 +49,17 @@ class Walks:
     """Walks of workers in episodes of the same length, as one batch."""
 
     bodies: Body
-    """All bodies, stacked."""
+    """All bodies, stacked in one record."""
     motions: tuple[WorkerMotion, ...]
-    """Motions at T control steps, each a record of arrays (B, W, ...); the first is the start."""
+    """Motions at T control steps, beginning with the start; each is a record of arrays (B, W,
+    ...)."""
     q: JointAngles
-    """Joint angles (B, N) of the arm, which rests [rad]."""
+    """Joint angles (B, N) of the resting arm [rad]."""
 
 
 @lru_cache(maxsize=1)
 def make_walks(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
-    """Return the walks of workers at their work, one episode of `n_steps` per seed."""
+    """Simulate workers at their work and return one walk of `n_steps` control steps per seed."""
     config, bodies = HRCConfig(), load_bodies(select_bodies(BODIES))
     place = build(config.scene, scene, n_workers, bodies.names)
     state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
@@ -73,13 +75,13 @@ def make_walks(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int)
 
 
 def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgress) -> Sums:
-    """Return the sums of every episode, in the order of the seeds.
+    """Play all episodes of a setting and return the sums of each, in the order of the seeds.
 
     Args:
-        setting: detections and estimator.
+        setting: the setting.
         walks: walks of the workers.
-        seeds: seeds of detector and estimator; episode k has turn k modulo the number of turns.
-        tick: is called with the growth of the completed share.
+        seeds: seeds of detector and estimator; episode k uses turn k modulo the number of turns.
+        tick: callback that receives the increase of the completed share.
     """
     jobs, found = _split_jobs(setting.turns, len(seeds)), Sums()
 
@@ -97,12 +99,12 @@ def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgres
 
 
 class Job(NamedTuple):
-    """Episodes that are played together."""
+    """Episodes that are played as one batch."""
 
     turn: Turn
-    """The cameras."""
+    """Cameras and their faults."""
     ids: Ints
-    """Indices of the episodes (B,)."""
+    """Indices (B,) of the episodes."""
 
 
 def _split_jobs(turns: Sequence[Turn], n_episodes: int) -> list[Job]:
@@ -118,7 +120,7 @@ def _split_jobs(turns: Sequence[Turn], n_episodes: int) -> list[Job]:
 def _play_episodes(
     setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints
 ) -> Sums:
-    """Return the sums of some episodes with the cameras of a turn, after the warm-up."""
+    """Play some episodes with the cameras of a turn; return their sums after the warm-up."""
     errors, inside, lost, seeing, scene = [], [], [], [], make_scene(setting, turn)
     known, identities = [], make_identities(len(ids), setting.n_workers)
     for frame in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
@@ -148,7 +150,7 @@ def _play_episodes(
 
 
 def _sum_joints(error_m: Floats, inside: Bools, mask: Bools, prefix: str) -> Sums:
-    """Return sums of the values (B, T, W, J) in a mask, under names that begin with `prefix`."""
+    """Return sums of the values (B, T, W, J) in a mask, with names that begin with `prefix`."""
     axes = tuple(range(1, error_m.ndim))
     return {
         f"{prefix}errors": ERRORS_M.count(error_m, mask).tolist(),
@@ -162,11 +164,11 @@ class WatchedFrame(NamedTuple):
     """One frame of some episodes."""
 
     estimate: PoseEstimate
-    """The estimate of the tracker."""
+    """Estimate of the tracker."""
     truth: TrueSensorInput
-    """The true state."""
+    """True state."""
     keypoints: Keypoints
-    """The detections."""
+    """Detections of the cameras."""
 
 
 def watch(
@@ -175,11 +177,11 @@ def watch(
     """Yield the frames of some episodes of a setting.
 
     Args:
-        setting: detections and estimator.
-        turn: the cameras.
+        setting: the setting.
+        turn: cameras and their faults.
         walks: walks of the workers in all episodes.
         seeds: seeds of all episodes.
-        ids: indices of the episodes to play (B,).
+        ids: indices (B,) of the episodes to play.
     """
     pipeline = make_setting_pipeline(setting, turn, len(ids))
     rngs: list[Generators] = [
@@ -214,13 +216,13 @@ def make_scene(setting: Setting, turn: Turn) -> Scene:
 
 
 def match_tracks(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """Return the index (B, W) of each worker's track, with the least sum of distances.
+    """Return the index (B, W) of each worker's track, for the least sum of distances.
 
-    Tracks that are not followed cost nothing, so they are assigned last.
+    Inactive tracks have a cost of 0, so that they are assigned to the workers that remain.
 
     Args:
         mean_world: estimated joints of the tracks (B, W, J, 3) [m].
-        tracked: which tracks are followed (B, W).
+        tracked: mask (B, W) of the active tracks.
         joints_world: true joints of the workers (B, W, J, 3) [m].
     """
     n_workers = tracked.shape[1]

@@ -1,4 +1,4 @@
-"""The report of the ablations: for each question its text, a figure and a table."""
+"""The report of the ablations, with a text, a figure and a table for each question."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -51,7 +51,7 @@ def make_report(
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
-    """Draw the errors of all rows with intervals, and their coverage as numbers at the right."""
+    """Draw the errors of all rows with intervals, and write their coverage on the right."""
     places = np.arange(len(rows), dtype=float)[::-1]
     figure = make_figure(9, 0.3 * len(rows) + 1.6)
     axis = figure.subplots()

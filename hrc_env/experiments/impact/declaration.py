@@ -34,7 +34,7 @@ Late images carry their time stamps, from which the tracker predicts; images tha
 time-stamped appear to be current."""
 _STEPS = "[per 1,000 steps]"
 _ROW = "{0}.{1}."
-"""Prefix of metrics: policy and setup."""
+"""Prefix of metrics, made of the policy and the setup."""
 COLUMNS = (
     Column(_ROW + "goals_per_min", "goals [1/min]"),
     Column(_ROW + "contacts_towards", "contacts towards [1/min]", 2, counted=True),
@@ -45,7 +45,7 @@ COLUMNS = (
     Column(_ROW + "cost", "true cost [per episode]"),
     Column(_ROW + "cost_towards", "true cost while moving towards [per episode]"),
 )
-"""Columns of the documentation and of the report."""
+"""Columns of the tables in the documentation and in the report."""
 MORE = (
     Column(_ROW + "contacts_standing", "standing arm pushed [1/min]", 2, counted=True),
     Column(_ROW + "contacts_fleeing", "moving away [1/min]", 2, counted=True),
@@ -53,7 +53,7 @@ MORE = (
     Column(_ROW + "separation_min_m", "least separation [m]", 3),
     Column(_ROW + "tax_m", "tax [m]", 2),
 )
-"""Further columns of the report."""
+"""Further columns of the tables in the report."""
 ONE = PerceptionSetup(n_cameras=1).name
 NUMBERS = {
     "contacts_with_one": Column(f"difference.{SLOWED}.{ONE}.contacts_towards", digits=2),
@@ -100,18 +100,18 @@ def make_results_table(policy: str, setups: Sequence[str]) -> Table:
 
     Args:
         policy: label of the policy.
-        setups: names of setups.
+        setups: names of perception setups.
     """
     rows = {(policy, s): (find_setup(s).words,) for s in setups}
     return Table("results", f"`{policy}`", rows, (*COLUMNS, *MORE), ("perception",))
 
 
 def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> Table:
-    """Return the table of a policy's differences from the reference.
+    """Return the table of a policy's differences from the reference setup.
 
     Args:
         policy: label of the policy.
-        setups: names of setups, without the reference.
+        setups: names of perception setups, without the reference.
         marked: whether differences are marked if their interval excludes zero.
     """
     columns = [
@@ -123,12 +123,12 @@ def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> 
 
 
 def make_documentation_table(setups: Sequence[str]) -> Table:
-    """Return the documentation's table.
+    """Return the table for the documentation.
 
-    Setups of rendered images are left out, as their rows are short.
+    Setups with rendered images are left out, because they have few episodes.
 
     Args:
-        setups: names of setups.
+        setups: names of perception setups.
     """
     emulated = [name for name in setups if find_setup(name).level != "pixels"]
     table = make_results_table(SLOWED, emulated)

@@ -1,7 +1,7 @@
 """Episodes of one policy with one perception setup, on fixed seeds and with the same workers.
 
-Distances are between true capsules, as in the cost; directed speeds and contacts are those of
-`safety.incidents`.
+Distances are between true capsules, as in the cost; `safety.incidents` defines directed speeds and
+contacts.
 """
 
 import hashlib
@@ -31,18 +31,19 @@ from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
 STOP_M, SLOW_M = 0.10, 0.60
-"""Separations below which the robot should stop and slow down [m]: `agents.scripted.Yielding`."""
+"""Separations below which the robot should stop and slow down [m] (`agents.scripted.Yielding`)."""
 MakeAgent = Callable[[Simulation], Agent]
-"""A function that makes the agent for a simulation's robot."""
+"""Function that makes the agent for the robot of a simulation."""
 STEP = np.dtype([
     ("true_separation_m", float), ("believed_separation_m", float),
     ("robot_mps", float), ("worker_mps", float),
     ("error_m", float, N_JOINTS), ("joints_world", float, (N_JOINTS, 3)),
 ])  # fmt: skip
-"""The state in one step: true and estimated separation at its end, directed speeds, joint errors.
+"""Data type of a step: true and estimated separation at its end, directed speeds, joint errors.
 
-The estimated separation is infinite without a track. Speeds are towards the other [m/s]; errors of
-the estimated joints and true joints are in metres.
+The estimated separation is infinite without a track. The speeds of robot and worker are directed
+towards each other [m/s]. Errors of the estimated joints and positions of the true joints are in
+metres.
 """
 Steps = NDArray[np.void]
 
@@ -55,15 +56,15 @@ def play(
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return the sums of every episode of a policy, in the order of the seeds.
+    """Play episodes of a policy and return the sums of each, in the order of the seeds.
 
     Args:
         stage: the environments.
         seeds: seeds, one per episode.
-        n_steps: control steps of an episode.
-        make_agent: makes the policy, which receives observations only.
+        n_steps: number of control steps of an episode.
+        make_agent: function that makes the policy, which receives only observations.
         margin_m: distance that the policy adds to its limits [m].
-        tick: is called with the growth of the completed share.
+        tick: callback that receives the increase of the completed share.
     """
 
     def play_block(env: Shards, seeds: list[int], tick: PartProgress) -> Rows:
@@ -83,23 +84,23 @@ def play_row(
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return the sums of `play`, from environments that are made for this call.
+    """Play episodes as `play` does, in environments that are made for this call.
 
     Args:
         setup: perception of the robot.
         env_arguments: other arguments of the environments.
         seeds: seeds, one per episode.
-        n_steps: control steps of an episode.
-        make_agent: makes the policy, which receives observations only.
+        n_steps: number of control steps of an episode.
+        make_agent: function that makes the policy, which receives only observations.
         margin_m: distance that the policy adds to its limits [m].
-        tick: is called with the growth of the completed share.
+        tick: callback that receives the increase of the completed share.
     """
     with closing(Stage(setup, setup.turns, env_arguments)) as stage:
         return play(stage, seeds, n_steps, make_agent, margin_m, tick)
 
 
 class PlayedEpisodes(NamedTuple):
-    """The steps of episodes that were played together."""
+    """The steps of episodes that were played as one batch."""
 
     steps: Steps
     """Records of T steps (T, B), of type `STEP`."""
@@ -114,14 +115,14 @@ def run(
     n_steps: int,
     on_step: Callable[[], None],
 ) -> PlayedEpisodes:
-    """Play one episode per seed together.
+    """Play one episode per seed as one batch.
 
     Args:
         env: the environments.
-        make_agent: makes the policy.
+        make_agent: function that makes the policy.
         seeds: seeds, one per episode.
-        n_steps: control steps of an episode.
-        on_step: is called after every step.
+        n_steps: number of control steps of an episode.
+        on_step: callback after every step.
     """
     agent, endless = make_agent(env.first), EndlessEpisodes(env)
     steps, infos = [], []
@@ -136,7 +137,7 @@ def run(
 
 
 def measure_step(part: Simulation) -> Steps:
-    """Return the present separations and joint errors of a simulation's only worker (B,)."""
+    """Return the current separations and joint errors (B,) of the only worker in each episode."""
     worker = worker_truth(part.bodies, generator.current(part.motion))
     joints_world = worker.joints_world[:, 0]
     steps = np.zeros(len(joints_world), STEP)
@@ -162,8 +163,8 @@ def sum_episodes(
         steps: records of T steps (T, B).
         infos: infos of T steps.
         margin_m: distance that the policy adds to its limits [m].
-        dt_s: control step [s].
-        achieved: info that counts as goals (`Task.achieved`).
+        dt_s: duration of a control step [s].
+        achieved: name of the info that counts goals (`Task.achieved`).
     """
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
     cost = np.stack([info["cost"] for info in infos])
@@ -184,7 +185,7 @@ def sum_episodes(
 
 
 def _count_decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
-    """Return the numbers (B,) of right and wrong decisions by the estimate, and of approaches."""
+    """Return the numbers (B,) of required, missed and false reactions, and of approaches."""
     found = {}
     for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
         called = steps["true_separation_m"] < limit_m
@@ -197,7 +198,7 @@ def _count_decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
 
 
 def _count_values(steps: Steps) -> dict[str, Ints]:
-    """Return histograms (B, bins): errors of all steps, separations and speeds of near ones."""
+    """Return histograms (B, bins) of joint errors, and of separation errors and speeds if near."""
     near = (steps["true_separation_m"] < SLOW_M).T
     optimism_m = (steps["believed_separation_m"] - steps["true_separation_m"]).T
     return {

@@ -1,4 +1,4 @@
-"""The impact study: every policy with every perception setup, on the same workers."""
+"""The impact study, in which every policy meets the same workers with every perception setup."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -53,40 +53,40 @@ class SetupRows(NamedTuple):
 
     setup: PerceptionSetup
     policies: list[Policy]
-    """Policies, one row each."""
+    """Policies, each of which has one row."""
 
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """The experiment, and the amount of data that is played."""
+    """The impact study and its settings."""
 
     name = "impact"
     depends = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
     task: str = DEFAULT
     """Id of the environment."""
     shield: str | None = None
-    """Name of the shield; None: there is none."""
+    """Name of the shield, or None for no shield."""
     n_seeds: int = 90
-    """Number of episodes per row; at level `pixels` at most `n_pixels`."""
+    """Number of episodes per row; at the level `pixels`, at most `n_pixels`."""
     n_pixels: int = 3
-    """Number of episodes per row at level `pixels`, where every image is rendered."""
+    """Number of episodes per row at the level `pixels`, at which every image is rendered."""
     n_steps: int = 250
-    """Control steps of an episode; the command uses the task's."""
+    """Number of control steps of an episode; the command uses the time limit of the task."""
     learning_steps: int = 300_000
-    """Number of environment steps for training the learnt policy."""
+    """Number of environment steps in the training of PPO."""
     policies: tuple[str, ...] = POLICIES
-    """Policies to compare: `POLICIES`, or agents as `hrc_env.make_agent` takes them."""
+    """Policies to compare: `POLICIES`, or agents as `hrc_env.make_agent` accepts them."""
     control: str | None = None
-    """Control of policies without one in their files; None: the default."""
+    """Control mode of policies without one in their files; None: the default."""
     trust: bool = False
-    """Whether pickles in their checkpoints may be loaded, as in `make_agent`."""
+    """Whether pickles in the policies' checkpoints may be loaded, as in `make_agent`."""
     setups: tuple[str, ...] = field(default_factory=list_default_setups)
-    """Names of perception setups; the reference must be among them."""
+    """Names of perception setups, which must include the reference."""
     margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
-    """Distances that `scripted_slowed` adds to its limits when margins are compared [m]."""
+    """Margins to compare [m], which `scripted_slowed` adds to its limits."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for settings that cannot work."""
+        """Raise `ConfigError` if a setting is invalid."""
         find_task(self.task)
         find_shield(self.shield)
         check_at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
@@ -110,24 +110,24 @@ class Impact:
         return self.list_seeds("keypoints")
 
     def list_seeds(self, level: str) -> list[int]:
-        """Return the seeds of a perception level."""
+        """Return the seeds of the episodes at a perception level."""
         n = min(self.n_seeds, self.n_pixels) if level == "pixels" else self.n_seeds
         return [FIRST_SEED + k for k in range(n)]
 
     @property
     def is_quick(self) -> bool:
-        """Whether the episodes or the training are too few to compare anything."""
+        """Whether there are too few episodes or training steps for comparisons."""
         is_short = PPO in self.policies and self.learning_steps <= QUICK["learning_steps"]
         return any(getattr(self, n) <= QUICK[n] for n in ("n_seeds", "n_steps")) or is_short
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a quick run; "" if it is not quick."""
+        """The warning on tables and figures of a quick run; "" for other runs."""
         return describe_quick_run(self.n_seeds, self.n_steps * DT_S) if self.is_quick else ""
 
     @property
     def warning(self) -> str:
-        """The warning at the top of the report of a quick run; "" if it is not quick."""
+        """The warning at the top of the report of a quick run; "" for other runs."""
         if not self.is_quick:
             return ""
         played = f"{self.n_seeds} episodes of {self.n_steps * DT_S:g} s per row"
@@ -138,7 +138,7 @@ class Impact:
         )
 
     def list_rows(self) -> Iterator[SetupRows]:
-        """Yield every setup with its policies; late ones and the reference have all margins."""
+        """Yield each setup with its policies; delayed setups and the reference have all margins."""
         swept = [REFERENCE, *(each.name for each in LATE)] if SLOWED in self.policies else []
         for name in self.setups:
             margins_m = self.margins_m if name in swept else ()
@@ -151,14 +151,14 @@ class Impact:
         return sum(len(row.policies) for row in self.list_rows()) + (PPO in self.policies)
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         given = {name: each for name, each in asdict(self).items() if name != "trust"}
         if self.control is None:
             del given["control"]
         return {"people": PEOPLE, **given}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the sums of every row; raise `HRCError` if workers moved differently in some."""
+        """Return the sums of all rows; raise `HRCError` if workers moved differently in any row."""
         table: dict[tuple[str, str], dict[str, list[Any]]] = {}
         checkpoint, ppo = cache.folder / "ppo.zip", ""
         if PPO in self.policies:
@@ -236,7 +236,7 @@ class Impact:
 
 
 def _play(label: str, *given: Any) -> Any:
-    """Return the sums of `play_row`; errors begin with the label of the policy."""
+    """Return the sums of `play_row`, and add the policy's label to the messages of errors."""
     try:
         return play_row(*given)
     except ConfigError as error:
@@ -244,7 +244,7 @@ def _play(label: str, *given: Any) -> Any:
 
 
 QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
-"""The quick form: every number, from few episodes of 4 s and little training."""
+"""Settings of the quick form, with few episodes of 4 s and little training."""
 
 
 def make_experiment(
@@ -257,10 +257,10 @@ def make_experiment(
     control: str | None = None,
     trust: bool = False,
 ) -> Impact:
-    """Return the experiment with the settings of the command line.
+    """Return the experiment for the options of the command line.
 
     If estimators are given, only these, the reference, the truth and no perception are compared; if
-    robots are given, only these agents act.
+    robots are given, only these agents are compared.
     """
     whole = Impact(n_steps=find_task(task).max_episode_steps)
     config = override(

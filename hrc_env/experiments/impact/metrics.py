@@ -1,11 +1,12 @@
 """Metrics of the impact study: rows, differences from the reference, and the cost of latency.
 
-The separation lost to latency is measured in two ways, both against the truth: in the belief, by
-the growth of the 95th percentile of estimated minus true separation; in the loop, by the margin
-that `scripted_slowed` must add to its limits until its share of missed stops is that on time. It is
-predicted as latency x (v_h + v_r), with a worker's nominal speed and with measured speeds; and as
-if latency and other errors were independent: then their squares add up, and the robot's speed does
-not count, as its encoders are not late.
+The separation lost to latency is measured in two ways, both relative to the ground truth: in the
+belief, as the increase of the 95th percentile of the estimated minus the true separation; in the
+loop, as the margin that `scripted_slowed` must add to its limits to have the same share of missed
+stops as without latency. It is predicted as latency x (v_h + v_r), with a worker's nominal speed or
+with measured speeds. A third prediction assumes that latency and other errors are independent:
+their squares then add up, and the robot's speed has no effect, because its encoders have no
+latency.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,12 +36,12 @@ verify against the standard before certification) [m/s]."""
 CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
 """Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
-"""Metrics per minute, with the sums that they count."""
+"""Metrics per minute, with the names of the sums from which they are computed."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
-"""Sums that are counted per thousand control steps; `called_slowings`: the worker is near."""
+"""Sums that are given per 1,000 control steps; `called_slowings` counts steps near the worker."""
 AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
 """Sums that are averaged over episodes, with their units."""
 
@@ -50,7 +51,7 @@ class Quantile(NamedTuple):
 
     bins: Bins
     counts: str
-    """Name of the sum with the counts, without "_counts"."""
+    """Name of the sum with the histogram, without "_counts"."""
     q: float
     unit: str
 
@@ -66,23 +67,23 @@ COMPARED = (
     "goals_per_min", "cost", "cost_towards", "called_slowings", "separation_min_m",
     "contacts_towards", "contacts_standing", "approaches", "missed_stops", "false_stops",
 )  # fmt: skip
-"""Metrics that are compared with the reference, episode by episode, besides Z_d."""
+"""Metrics that, like Z_d, are compared with the reference episode by episode."""
 
 
 class Ratio(NamedTuple):
     """A metric that is the ratio of two sums over episodes."""
 
     numerator: Floats
-    """One number per episode (n,)."""
+    """Numerators (n,), one per episode."""
     denominator: Floats
-    """One number per episode (n,)."""
+    """Denominators (n,), one per episode."""
     unit: str
 
 
 def compute_metrics(table: Played, margins_m: Sequence[float]) -> dict[str, Metric]:
     """Return all metrics by name.
 
-    Names are `<policy>.<setup>.<metric>`, the same after `difference.` and `p.` (see
+    Names are `<policy>.<setup>.<metric>`, the same with the prefixes `difference.` and `p.` (see
     `intervals.compare_paired`), and `lateness.<setup>.<way>`.
 
     Args:
@@ -110,7 +111,7 @@ def compute_metrics(table: Played, margins_m: Sequence[float]) -> dict[str, Metr
 
 
 def _compare_rows(name: str, row: Row, reference: Row) -> Metrics:
-    """Return differences from the reference, over the episodes of both: same seeds and workers."""
+    """Return differences from the reference over the seeds that both rows have."""
     n, ours, theirs = len(row["walk"]), _compute_ratios(row), _compute_ratios(reference)
     metrics: dict[str, Metric] = {}
     for key in COMPARED:
@@ -160,8 +161,8 @@ def _compute_ratios(row: Row) -> dict[str, Ratio]:
 def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
     """Return the separation tax Z_d + latency x (v_h + v_r) [m].
 
-    Z_d is that of the same setup on time, so that nothing counts twice; v_h is nominal, v_r the
-    robot's measured speed.
+    Z_d is that of the same setup without latency, so that latency is not counted twice; v_h is the
+    worker's nominal speed, and v_r the robot's measured speed.
     """
     value, low, high = (
         getattr(z_d, end) + latency_s * (NOMINAL_MPS + getattr(v_r, end))
@@ -200,7 +201,7 @@ def find_margin(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metri
     Args:
         rows: rows of one setup, one per margin.
         margins_m: the margins (M,) [m].
-        reference: row of the reference.
+        reference: row of the reference setup.
     """
     missed = np.array([row["missed_stops"] for row in (*rows, reference)], float).T
     called = np.array([row["called_stops"] for row in (*rows, reference)], float).T

@@ -1,4 +1,4 @@
-"""The policies of the impact study: two scripted ones, PPO trained here, and users' own."""
+"""The policies of the impact study: two scripted ones, PPO, and agents of users."""
 
 import hashlib
 from collections.abc import Callable
@@ -27,7 +27,7 @@ WORDS = {
     PPO: "was trained here with the reference",
 }
 POLICIES = tuple(WORDS)
-"""Policies of the study, with their descriptions; others are users' own."""
+"""Names of the study's built-in policies."""
 SEED = 0
 """Seed of the learner and of its environments."""
 N_ENVS = 64
@@ -35,7 +35,7 @@ N_ENVS = 64
 PROXIMITY = 2.0
 """Weight of proximity in the reward, as in `train.py`."""
 RAMP_SHARE = 0.5
-"""Share of the training steps in which this weight grows from 0."""
+"""Share of the training steps in which the weight of proximity grows from 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Policy:
     """A policy, and the margin that it adds to its separation limits."""
 
     name: str
-    """One of `POLICIES`, or an agent as `hrc_env.make_agent` takes it."""
+    """One of `POLICIES`, or an agent as `hrc_env.make_agent` accepts it."""
     margin_m: float = 0.0
     """Distance that the policy adds to its limits [m]."""
 
     @property
     def label(self) -> str:
-        """Label in parts and results."""
+        """Label of the policy in parts and results."""
         if self.name not in POLICIES:
             return label_agent(self.name, WORDS)
         if self.margin_m == 0:
@@ -58,11 +58,11 @@ class Policy:
 
 
 def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
-    """Return the settings of a policy that key its rows, besides people and perception, for JSON.
+    """Return the settings of a policy for the keys of its rows, for JSON.
 
     Args:
         policy: the policy.
-        ppo: digest of the checkpoint that was trained here.
+        ppo: digest of PPO's checkpoint, which is trained in the study.
     """
     settings = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
     own = {} if policy.name in POLICIES else {"agent": describe_agent(policy.name)}
@@ -70,7 +70,7 @@ def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
 
 
 def choose_control(policy: Policy, control: str | None) -> str | None:
-    """Return the control of a policy: that of its file, or else the requested one.
+    """Return the control mode of a policy: that of its file, or otherwise the requested one.
 
     PPO is trained with the default control.
     """
@@ -80,7 +80,7 @@ def choose_control(policy: Policy, control: str | None) -> str | None:
 
 
 def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
-    """Return a function that makes the agent for a robot, on any machine."""
+    """Return a function that makes the agent for a simulation and can be sent to any machine."""
     if policy.name == SLOWED:
         return partial(_make_slowed, policy.margin_m)
     name = str(checkpoint) if policy.name == PPO else policy.name
@@ -97,10 +97,10 @@ def _make_agent(name: str, trust: bool, part: Simulation) -> Agent:
 
 
 def train_once(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
-    """Return the digest of PPO's checkpoint; train again if the file does not match its part.
+    """Return the digest of PPO's checkpoint, and train PPO if the file does not match its part.
 
     Args:
-        cache: parts of the study.
+        cache: cache of the study's parts.
         n_steps: environment steps of the training.
         path: file of the checkpoint.
         key: key of the part.
@@ -115,7 +115,7 @@ def train_once(cache: PartCache, n_steps: int, path: Path, key: str, task: str =
 
 
 def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
-    """Train on the camera emulator with the default estimator, and write the checkpoint."""
+    """Train PPO on the camera emulator with the default estimator, and write its checkpoint."""
     from hrc_env.agents import checkpoints  # here: it imports the learner
     from hrc_env.sb3 import HRCVecEnv
 
@@ -129,13 +129,13 @@ def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT)
 
 
 def train(env: Any, n_steps: int, seed: int, on_step: Callable[[Any], None]) -> Any:
-    """Return a PPO learner after a training.
+    """Train PPO and return the learner.
 
     Args:
         env: the environments, which are closed after the training.
         n_steps: environment steps of the training.
         seed: seed of the learner.
-        on_step: is called with the learner before the training and after each step.
+        on_step: callback that receives the learner before the training and after each step.
     """
     import torch  # here: a learner takes seconds to import, and need not be there
     from stable_baselines3.common.callbacks import ConvertCallback

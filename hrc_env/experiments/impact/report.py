@@ -21,14 +21,14 @@ from hrc_env.experiments.setups import LATE_S, REFERENCE, find_setup
 from hrc_env.tracking.estimators import ESTIMATORS
 
 LEAST_SHARE = 0.25
-"""Least share of the best robot's goals with which a trained policy has learnt the task."""
+"""Least share of the best policy's goals at which PPO counts as having learnt the task."""
 COLOURS = {
     "particle": "C0", "kalman": "C2", "triangulation": "C4", "paper_restarts": "C6",
     "truth": "black", "none": "0.55", "pixels": "C1",
 }  # fmt: skip
 """Colours of perception levels, and of estimators with four cameras."""
 FREE_COLOURS = ("C3", "C5", "C8", "C9")
-"""Colours of other estimators, in turns."""
+"""Colours of other estimators, which are used in turn."""
 CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 """Colours by number of cameras."""
 LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
@@ -37,7 +37,7 @@ ACROSS = {
     "cost_towards": "true cost while moving towards the worker  (lower is safer)",
     "approaches": "approaches per 1,000 steps  (lower is safer)",
 }
-"""Metrics on the horizontal axis, with their labels."""
+"""Metrics on the horizontal axes, with the labels of the axes."""
 
 
 def make_report(
@@ -50,7 +50,8 @@ def make_report(
         table: rows of episodes.
         metrics: metrics by name.
         robots: agents by their labels in the table.
-        warning: text at the top if the run is too short; no difference is marked then.
+        warning: text at the top of the report if the run is too short for comparisons, in which
+            case no difference is marked; "" for other runs.
     """
     policies = [name for name in robots if (name, REFERENCE) in table]
     question = [*filter(None, (warning, QUESTION, _describe_robots(robots)))]
@@ -87,7 +88,7 @@ def make_report(
 
 
 def _describe_robots(robots: Mapping[str, str]) -> str:
-    """Return a sentence with the policies."""
+    """Return a sentence that describes the policies."""
     texts = [
         f"`{label}` {ROBOTS[label]}" if label in ROBOTS else f"`{label}` is the agent `{agent}`"
         for label, agent in robots.items()
@@ -98,8 +99,8 @@ def _describe_robots(robots: Mapping[str, str]) -> str:
 def has_learnt(metrics: Metrics, policies: Sequence[str]) -> bool:
     """Return whether PPO has learnt the task, judged with the reference perception.
 
-    It has if it reaches at least a quarter of the goals per minute of the best other policy; if
-    there is no other, if its interval excludes zero.
+    It has if it reaches at least a quarter of the goals per minute of the best other policy or,
+    without other policies, if the interval of its goals per minute excludes zero.
     """
     found = {name: metrics[f"{name}.{REFERENCE}.goals_per_min"] for name in policies}
     others = [each.value for name, each in found.items() if name != PPO]
@@ -116,11 +117,11 @@ def draw_tradeoff(
 ) -> None:
     """Draw goals per minute against true cost while the robot moves towards the worker.
 
-    A second row shows them against approaches, without setups that have no track and without the
-    policy that ignores the worker.
+    A second row of panels shows goals against approaches, without setups that have no track and
+    without the policy that ignores the worker.
 
     Args:
-        path: file of the picture.
+        path: picture file to write.
         metrics: metrics by name.
         policies: labels of policies, one column each.
         setups: names of setups, one point each.
@@ -150,7 +151,7 @@ def draw_tradeoff(
 def _draw_panel(
     axis: Axes, metrics: Metrics, policy: str, setups: Sequence[str], across: str
 ) -> None:
-    """Draw the goals of one policy against a metric of `ACROSS`, with paired differences."""
+    """Draw one policy's goals against a metric of `ACROSS`, with intervals of the differences."""
     for name in setups:
         setup, place, bars = find_setup(name), [], []
         for key in (across, "goals_per_min"):

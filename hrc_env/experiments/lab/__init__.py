@@ -1,1 +1,1 @@
-"""The paper's laboratory (section 4.2): all joints, five kinds of motion, one camera or four."""
+"""The paper's laboratory (section 4.2): all joints, six kinds of motion, one camera or four."""

@@ -19,12 +19,12 @@ is off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras
 the estimate is further from the truth than that. A side is *turned away* if its shoulder and hip
 are further from the camera than the other's by 8 cm."""
 ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
-"""Estimators that are replayed on the films; misses are counted for the first."""
+"""Estimators that are replayed on the films; missed joints are counted for the first."""
 SINGLE = tuple(camera for camera in CAMERA_LABELS if camera != MULTI)
 ALL = "all"
 """Name of all motions together."""
 SHOWN = "paper_restarts"
-"""The other estimator that the documentation shows, over all motions."""
+"""Second estimator in the table of the documentation, with its errors over all motions."""
 WORDS = {
     **{motion: motion for motion in (*MOTIONS, ALL)},
     "moving_board": "moving a board in both hands",
@@ -78,6 +78,6 @@ LESS = Table(
 
 
 def make_errors_table(estimator: str) -> Table:
-    """Return the table of errors of an estimator, motion by motion."""
+    """Return the table of an estimator's errors, with one row per motion."""
     rows = {(estimator, m): (words,) for m, words in WORDS.items()}
     return Table("lab_errors", f"`{estimator}`", rows, COLUMNS, ("motion",))

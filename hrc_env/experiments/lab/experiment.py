@@ -1,4 +1,4 @@
-"""The laboratory study: every motion is filmed by four cameras; one camera is compared with all."""
+"""The laboratory study, which films motions with four cameras and compares one camera with all."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import load_body, worker_names
 
 RIG = "lab_gopro"
-"""Name of the rig."""
+"""Name of the rig of cameras."""
 CROPS = "particle"
 """Name of the estimator that the crops follow."""
 QUANTILES = {"median": 0.5, "p95": 0.95}
@@ -47,7 +47,7 @@ Films = Mapping[tuple[str, int], Film]
 
 @dataclass(frozen=True, slots=True)
 class Lab:
-    """The experiment, and the amount of data that is recorded."""
+    """The laboratory study and its settings."""
 
     name = "lab"
     depends = ("env", "tracker", "emulator", "detector", "motion")
@@ -56,11 +56,11 @@ class Lab:
     max_frames: int = 250
     """Greatest number of frames in a film."""
     folded: str = "full"
-    """Landmark network for folded postures; "heavy" is fetched once with `python -m hrc_env setup
-    --networks heavy`."""
+    """Landmark network for folded postures; "heavy" must first be fetched with `python -m hrc_env
+    setup --networks heavy`."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for settings that cannot work."""
+        """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds")
         DetectorConfig(folded_network=self.folded)
 
@@ -76,16 +76,16 @@ class Lab:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """The warning on tables and figures of a short run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {**asdict(self), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
 
     def play(self, cache: PartCache) -> Films:
-        """Return every film."""
+        """Record all films and return their errors."""
         keys = [(motion, seed) for seed in self.seeds for motion in MOTIONS]
         parts = [
             Part(f"{motion}.{seed}", partial(measure_film, self, motion, seed))
@@ -98,7 +98,7 @@ class Lab:
         return compute_metrics(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table for the documentation."""
         return (ERRORS,)
 
     def report(self, played: Films, metrics: Metrics, figures: Path) -> Report:
@@ -108,16 +108,16 @@ class Lab:
 
 
 QUICK = Lab(n_seeds=2, max_frames=100)
-"""The quick form: every number, from fewer and shorter films."""
+"""The quick form, with fewer and shorter films."""
 
 
 def make_experiment(quick: bool = False, seeds: int | None = None, folded: str = "full") -> Lab:
-    """Return the experiment with the settings of the command line."""
+    """Return the experiment for the options of the command line."""
     return override(QUICK if quick else Lab(), n_seeds=seeds, folded=folded)
 
 
 class Laboratory(NamedTuple):
-    """The room of the study."""
+    """The room of the study, with the configuration of the environment."""
 
     scene: Scene
     config: HRCConfig
@@ -142,7 +142,7 @@ def record_film(config: Lab, motion: str, seed: int, tick: PartProgress) -> Reco
 
 
 def measure_film(config: Lab, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """Return the errors of all estimators on one film, after the warm-up."""
+    """Record one film and return the errors of all estimators on it, after the warm-up."""
     recording = record_film(config, motion, seed, lambda share: tick(0.8 * share))
     body = recording.scene.bodies[0]
     truth, errors = recording.joints_world[WARM_UP:], {}
@@ -183,7 +183,7 @@ def compute_metrics(played: Films) -> dict[str, Metric]:
 
 
 def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
-    """Return shares of missed joints, also of the averted side, and of those that four recover."""
+    """Return shares of joints that are missed, overall and on the averted side, and recovered."""
     metrics = {}
     counted = np.array([_count_joints(film) for film in films]).T
     for column, (n, missed, away, far, back) in zip(SINGLE, counted, strict=True):
@@ -199,8 +199,8 @@ def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
 def _count_joints(film: Film) -> Floats:
     """Return counts of joints (5, C) for each camera.
 
-    These are all joints; those missed; those turned away; of these, those missed; of these, those
-    known with all cameras.
+    The rows count all joints, the missed joints, the joints turned away, those of them that are
+    missed, and those of the latter that all cameras together locate.
     """
     missed, away = (np.asarray(film[name], bool) for name in ("missed", "away"))
     far = missed & away
@@ -209,10 +209,10 @@ def _count_joints(film: Film) -> Floats:
 
 
 def _read_errors_m(film: Film, key: str) -> Floats:
-    """Return distances (T, J) of an estimate from the truth [m]."""
+    """Return the distances (T, J) of an estimate from the truth [m]."""
     return np.asarray(film["errors_m"][key], float)
 
 
 def _find_known(film: Film) -> Bools:
-    """Return which joints (T, J) the estimate of all cameras has not missed."""
+    """Return a mask (T, J) of the joints that the estimate from all cameras has not missed."""
     return _read_errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]

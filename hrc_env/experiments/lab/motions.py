@@ -1,4 +1,4 @@
-"""Motions of the laboratory: the paper's list, performed by this package's activities."""
+"""Motions of the laboratory study: those of the paper, composed of activities of this package."""
 
 import math
 
@@ -13,7 +13,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
 
 WALKING = "walking"
-"""Name of the motion that has a path."""
+"""Name of the motion that follows a path."""
 _BOX, _BOARD = REPERTOIRE["box from the floor to a table"], REPERTOIRE["board in both hands"]
 ACTS: dict[str, tuple[Act, ...]] = {
     "standing": (*REPERTOIRE["stand"], *REPERTOIRE["look round"]),
@@ -24,19 +24,20 @@ ACTS: dict[str, tuple[Act, ...]] = {
 }
 """Activities of each motion.
 
-Bending: down to the floor, up, and down again. Lifting: a board in both hands, in place of the
-paper's whiteboard. The moves carry one for some 3 m, the second on the shoulder.
+In "bending", the worker bends down to the floor, rises, and bends down again. In "lifting", the
+worker lifts a board with both hands, instead of the paper's whiteboard. In "moving_board" and
+"moving_wood", the worker carries a board for about 3 m, in both hands or on the shoulder.
 """
 MOTIONS = ("standing", WALKING, "bending", "lifting", "moving_board", "moving_wood")
 """Names of the motions."""
 START_Y_M, START_X_M = 1.5, (0.9, 1.6)
-"""Start of motions that walk past the robot, to the side and along its axis [m]."""
+"""Start of motions past the robot [m]: distance to the side, and range along the robot's axis."""
 
 
 def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
-    """Return a motion (T, 1, S, ...) of at most `n_frames` frames in steps of `dt_s`.
+    """Return a motion (T, 1, S, ...) of at most `n_frames` frames at intervals of `dt_s`.
 
-    Position and heading are drawn from the seed.
+    Position and heading are drawn at random with the seed.
     """
     if motion == WALKING:
         return walk(scene, seed, n_frames, dt_s)

@@ -1,4 +1,4 @@
-"""The report of the laboratory study: the paper's figure 6 from our own data, and the errors."""
+"""The report of the laboratory study: the paper's figure 6 with data of the study, and errors."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -30,7 +30,7 @@ from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
 WARM_UP = 12
-"""Number of first frames for which all cameras are used, and which are not evaluated."""
+"""Number of frames at the start for which all cameras are used, and which are not evaluated."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
@@ -41,7 +41,7 @@ def make_report(figures: Path, take: Callable[[str], Recording], metrics: Metric
 
     Args:
         figures: folder of the figure.
-        take: records the film of a motion.
+        take: function that records the film of a motion.
         metrics: metrics by name.
     """
     draw_poses(figures / "figure_6.png", take)
@@ -55,13 +55,13 @@ def make_report(figures: Path, take: Callable[[str], Recording], metrics: Metric
 
 
 def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:
-    """Draw one row per motion.
+    """Draw one row of pictures per motion.
 
-    It shows a crop with its detections, and the body from one camera and from four.
+    A row shows a crop with its detections, and the body as estimated from one camera and from four.
 
     Args:
-        path: file of the picture.
-        take: records the film of a motion.
+        path: picture file to write.
+        take: function that records the film of a motion.
     """
     figure = make_figure(13, 14)
     for row, (motion, title) in enumerate(SHOWN):
@@ -88,7 +88,10 @@ class CameraFrame(NamedTuple):
 
 
 def find_shown_frame(recording: Recording) -> CameraFrame:
-    """Return a later frame and the camera that misses most joints of the averted side in it."""
+    """Return the frame and the camera with the most missed joints on the averted side.
+
+    The first third of the recording is excluded.
+    """
     missed = sides.find_missed_joints(recording) & sides.find_averted_joints(recording)
     searched = [[window is not None for window in windows[0]] for windows in recording.windows]
     n_missed = missed.sum(-1)
@@ -99,7 +102,7 @@ def find_shown_frame(recording: Recording) -> CameraFrame:
 
 
 def _render_crop(recording: Recording, frame: CameraFrame) -> Image:
-    """Return the crop that a camera gave the network, enlarged and with its detections."""
+    """Return the crop of a camera that the network received, enlarged and with its detections."""
     t, c = frame
     scene, window = recording.scene, recording.windows[t][0][c]
     renderer = CropRenderer(scene, CROP_PX)
@@ -117,7 +120,7 @@ def _render_crop(recording: Recording, frame: CameraFrame) -> Image:
 def _draw_body(
     figure: Figure, place: int, recording: Recording, estimate: Points3, frame: CameraFrame
 ) -> None:
-    """Draw an estimate and the truth, from a direction slightly beside the camera's."""
+    """Draw an estimate and the truth, viewed from a direction beside that of the camera."""
     axis: Any = figure.add_subplot(3, 3, place, projection="3d")
     (t, c), alone = frame, place % 3 == 2
     truth = recording.joints_world[t]

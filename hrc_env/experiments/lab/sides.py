@@ -9,25 +9,25 @@ from hrc_env.geometry.cameras import project, projections
 from hrc_env.worker.body import load_body
 
 MISSED_CONFIDENCE = 0.5
-"""Visibility below which a joint counts as missed (ours): the network always returns its points."""
+"""Visibility below which a joint counts as missed (judgement); the network returns all joints."""
 MISSED_SHARE = 0.05
-"""Share of the stature, in the image or in the room, beyond which an error counts as missed."""
+"""Error above which a joint counts as missed, as a share of the stature in the image or in 3D."""
 TURNED_M = 0.08
-"""Difference of distances from which a side is turned away [m].
+"""Difference of distances above which a side of the body counts as turned away [m].
 
-The shoulder and hip of that side are on average further from the camera than the other's by this;
+Distances from the camera are means over the shoulder and the hip of each side. The value is a
 judgement: a body is 0.36 m wide at the shoulders.
 """
 
 LEFT: Bools = np.array([name.startswith("left_") for name in JOINTS])
-"""Which joints (J,) are on the left side."""
+"""Mask (J,) of the joints on the left side."""
 RIGHT: Bools = np.array([name.startswith("right_") for name in JOINTS])
-"""Which joints (J,) are on the right side."""
+"""Mask (J,) of the joints on the right side."""
 _TRUNK = [name.endswith(("shoulder", "hip")) for name in JOINTS]
 
 
 def find_missed_joints(recording: Recording) -> Bools:
-    """Return which joints each camera missed in each frame (T, C, J)."""
+    """Return a mask (T, C, J) of the joints that each camera missed in each frame."""
     cameras, keypoints = recording.scene.cameras, recording.keypoints
     px, depth_m = project(projections(cameras), recording.joints_world)
     focal_px = np.array([[camera.K[0, 0]] for camera in cameras])
@@ -37,11 +37,11 @@ def find_missed_joints(recording: Recording) -> Bools:
 
 
 def find_averted_side(joints_world: Points3, eye_world: Floats) -> Bools:
-    """Return which joints (..., J) are on the side turned away from a camera.
+    """Return a mask (..., J) of the joints on the side turned away from a camera.
 
     Args:
         joints_world: joint positions (..., J, 3) [m].
-        eye_world: position of the camera (..., 3) [m].
+        eye_world: positions (..., 3) of the camera [m].
     """
     away_m = np.linalg.norm(joints_world - eye_world[..., None, :], axis=-1)
     left_m, right_m = (away_m[..., side & _TRUNK].mean(-1)[..., None] for side in (LEFT, RIGHT))
@@ -49,6 +49,6 @@ def find_averted_side(joints_world: Points3, eye_world: Floats) -> Bools:
 
 
 def find_averted_joints(recording: Recording) -> Bools:
-    """Return which joints are on the side turned away from each camera in each frame (T, C, J)."""
+    """Return a mask (T, C, J) of the joints on the side turned away from each camera."""
     eyes_world = np.stack([camera.eye_world for camera in recording.scene.cameras])
     return find_averted_side(recording.joints_world[:, None], eyes_world)

@@ -1,1 +1,1 @@
-"""The cost of perception at one rate of contacts, each setup with the margin that it needs."""
+"""The cost of perception at an equal rate of contacts, reached by the margin of each setup."""

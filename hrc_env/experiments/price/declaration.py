@@ -26,7 +26,7 @@ This is one level, one shield and one body of the worker, and detections are emu
 other contacts are not equalized. With true joints the shield still has its own model of the body
 around them. At a stricter level, or with another shield, the order may differ."""
 _ROW, _FRESH = "{0}.{1}.", "confirmed."
-"""Prefixes of metrics: task and perception setup, and counts of fresh episodes."""
+"""Prefixes of metrics: the task and the perception setup, and statistics of fresh episodes."""
 PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "tested margin [m]", 4, plain=True)
 TOWARDS = Column(
     f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [per 1,000]", 0, counted=True
@@ -37,16 +37,16 @@ LEFT = (
     Column(_ROW + "share", "throughput [% of unshielded]", 0, 100),
     Column(_ROW + "of_truth", "throughput [% of true joints]", 0, 100),
 )
-"""Columns of the metrics at the rate of contacts."""
+"""Columns of the metrics at the common rate of contacts."""
 COLUMNS = (*LEFT, PLAYED, TOWARDS)
-"""Columns of the documentation and of the report."""
+"""Columns of the tables in the documentation and in the report."""
 MORE = (
     Column(f"{_ROW}{_FRESH}standing", "standing [per 1,000]", 0, counted=True),
     Column(f"{_ROW}{_FRESH}away", "fleeing [per 1,000]", 0, counted=True),
     Column(f"{_ROW}{_FRESH}goals_per_min", "goals at tested margin [1/min]"),
     Column(f"{_ROW}{_FRESH}cost", "true cost at tested margin"),
 )
-"""Further columns of the report."""
+"""Further columns of the tables in the report."""
 CONTRAST_LABELS = {
     "three_cameras": "the fourth camera", "two_cameras": "the third and the fourth camera",
     "one_camera": "the second to the fourth camera",
@@ -78,7 +78,7 @@ WORTH = Table(
 
 
 def count_per_hour(level: float) -> float:
-    """Return the contacts per hour for a number of contacts in 1,000 episodes of 10 s."""
+    """Convert a number of contacts in 1,000 episodes of 10 s to contacts per hour."""
     return 60 * level / PER
 
 
@@ -98,7 +98,7 @@ def make_price_table(
         robot: description of the robot, as "the scripted robot".
         n_seeds: number of episodes per search step.
         level: contacts in 1,000 episodes of 10 s at which setups are compared.
-        more: columns besides those of the documentation.
+        more: columns in addition to those of the documentation.
     """
     return Table(
         "price",
@@ -118,7 +118,7 @@ def make_price_table(
 
 
 def make_small_price_table(task: str) -> Table:
-    """Return the table of another task, which has few setups."""
+    """Return the table of an additional task, in which few setups are compared."""
     rows = {(task, name): (list_eyes()[name].words,) for name in ELSEWHERE}
     return Table("price_in", task, rows, (*LEFT, TOWARDS), ("perception",))
 
@@ -143,7 +143,7 @@ def make_tasks_table(tasks: Sequence[str]) -> Table:
 
 
 def _make_rate_columns(prefix: str) -> list[Column]:
-    """Return the columns of counts on fresh episodes, for metrics with another prefix."""
+    """Return the columns of statistics of fresh episodes for metrics with another prefix."""
     return [
         replace(
             column,

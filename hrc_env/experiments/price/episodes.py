@@ -1,7 +1,7 @@
 """Episodes of a robot with a shield and one perception setup, and their outcomes.
 
 As in `experiments.impact`, all setups have the same seeds and workers, which ignore the robot;
-contacts are those of `safety.incidents`.
+`safety.incidents` defines contacts.
 """
 
 import zlib
@@ -30,58 +30,58 @@ from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
 SCRIPTED = "scripted"
-"""The agent that drives to its goals and ignores the worker."""
+"""Name of the agent that moves to its goals and ignores the worker."""
 CONTACTS = {
     "towards": "safety/contacts_towards", "standing": "safety/contacts_standing",
     "away": "safety/contacts_fleeing",
 }  # fmt: skip
-"""Contacts of the current episode, by the robot's motion, with their keys in infos."""
+"""Infos that count the contacts of the current episode, by the motion of the robot."""
 STEP = np.dtype([
     *((name, float) for name in (*CONTACTS, "achieved", "cost")), ("over", bool),
 ])  # fmt: skip
-"""State of an episode after a step: counts since its start, cost of the step, and whether it
-ended."""
+"""Data type of the state of an episode after a step: counts since the start of the episode, cost of
+the step, and whether the episode ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """The agent that drives the robot."""
+    """The agent that controls the robot."""
 
     agent: str = SCRIPTED
-    """Agent as `hrc_env.make_agent` takes it."""
+    """Agent as `hrc_env.make_agent` accepts it."""
     control: str | None = None
-    """Control of the agent if its file does not name one; None: the default."""
+    """Control mode of the agent if its file does not name one; None: the default."""
     trust: bool = False
-    """Whether pickles in its checkpoint may be loaded, as in `make_agent`."""
+    """Whether pickles in the agent's checkpoint may be loaded, as in `make_agent`."""
 
     @property
     def words(self) -> str:
-        """Description in reports."""
+        """Description of the robot in reports."""
         if self.agent == SCRIPTED:
             return "the scripted robot"
         return f"the robot that the agent `{self.agent}` drives"
 
     @property
     def env_arguments(self) -> dict[str, Any]:
-        """Argument of the environment that sets the control."""
+        """Arguments of the environment that set the control mode."""
         control = find_control(self.agent) or self.control
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:
-        """Return the agent's settings that episodes depend on, for JSON.
+        """Return the settings of the agent on which episodes depend, for JSON.
 
-        They are empty for the default agent.
+        They are empty for the default agent with the default control mode.
         """
         settings = {} if self.agent == SCRIPTED else {"agent": describe_agent(self.agent)}
         return settings | self.env_arguments
 
     def make(self, part: Simulation) -> Agent:
-        """Return the agent for a robot."""
+        """Make the agent for the robot of a simulation."""
         return make_agent(self.agent, env_info(part), trust=self.trust)
 
 
 class EpisodeRunner:
-    """The episodes of a task with one perception setup."""
+    """Environments that play the episodes of a task with one perception setup."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class EpisodeRunner:
         self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), arguments)
 
     def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
-        """Return the sums of every episode, with `margin_m` added to the shield's distances."""
+        """Play episodes with `margin_m` added to the shield's distances; return their sums."""
         self._shield.margin_m = margin_m
         play = partial(run, n_steps=self.n_steps, driver=self.driver)
         return self._stage.play(seeds, play, tick)
@@ -118,7 +118,7 @@ def play_episodes(
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return the result of `EpisodeRunner.play` in environments of its own.
+    """Play episodes as `EpisodeRunner.play` does, in environments that are made for this call.
 
     Args:
         eyes: the perception setup.
@@ -127,8 +127,8 @@ def play_episodes(
         is_shielded: whether there is a shield.
         driver: the agent.
         seeds: seeds of the episodes.
-        margin_m: distance added to the shield's distances [m].
-        tick: is called with the growth of the completed share.
+        margin_m: margin added to the shield's distances [m].
+        tick: callback that receives the increase of the completed share.
     """
     with closing(EpisodeRunner(eyes, task, n_steps, is_shielded, driver)) as runner:
         return runner.play(seeds, margin_m, tick)
@@ -137,7 +137,7 @@ def play_episodes(
 def run(
     env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int, driver: Driver
 ) -> Rows:
-    """Return the sums of one episode per seed, played together."""
+    """Play one episode per seed as one batch and return the sums of the episodes."""
     agent, endless, task = driver.make(env.first), EndlessEpisodes(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
     keys = {**CONTACTS, "achieved": task.achieved}
@@ -153,7 +153,7 @@ def run(
 
 
 def read_true_joints(part: Simulation) -> Points3:
-    """Return the true joints of all workers (B, W, J, 3) [m]."""
+    """Return the true joint positions (B, W, J, 3) of all workers [m]."""
     return worker_truth(part.bodies, generator.current(part.motion)).joints_world
 
 
@@ -161,8 +161,8 @@ def sum_episodes(steps: NDArray[np.void], dt_s: float) -> Rows:
     """Return the sums of episodes, as lists over episodes.
 
     Args:
-        steps: records (T, B) of `STEP`; steps after the end of an episode do not count.
-        dt_s: control step [s].
+        steps: records (T, B) of type `STEP`; steps after the end of an episode are ignored.
+        dt_s: duration of a control step [s].
     """
     ended = np.logical_or.accumulate(steps["over"], axis=0)
     counts = np.vstack([np.ones((1, steps.shape[1]), bool), ~ended[:-1]])

@@ -1,4 +1,4 @@
-"""The price study: every perception setup with the margin that it needs at one rate of contacts."""
+"""The price study: all perception setups, each with the margin for the same rate of contacts."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -44,12 +44,12 @@ QUICK_FRESH = 600
 FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
 """First seeds of the search, of the episodes that confirm it, and of those with rendered images."""
 BEYOND_M = (0.05, 0.1, 0.2)
-"""Distances by which a search is extended, one after the other, if its last margins do not suffice
+"""Distances by which a search is successively extended if its outermost margins do not suffice
 [m]."""
 
 
 class Case(NamedTuple):
-    """A task that is played with a perception setup."""
+    """A task and the perception setup with which it is played."""
 
     task: str
     eyes: Eyes
@@ -57,10 +57,10 @@ class Case(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Price:
-    """The experiment, and the amount of data that is played.
+    """The price study and its settings.
 
-    Numbers of episodes are for episodes of 10 s; of longer ones fewer are played, for the same
-    time.
+    Numbers of episodes refer to episodes of 10 s; if the episodes of a task are longer, fewer are
+    played, with the same total duration.
     """
 
     name = "price"
@@ -74,22 +74,22 @@ class Price:
     n_seeds: int = 300
     """Number of episodes per search step."""
     n_fresh: int = 1000
-    """Number of episodes, on other seeds, with the margin found."""
+    """Number of episodes on fresh seeds that are played with the margin found."""
     n_search: int = 4
-    """Number of bisections in a search; a margin on either side is then tried, too."""
+    """Number of bisections in a search, after which margins on either side are tried, too."""
     bracket_m: tuple[float, float] = (-0.4, 0.4)
-    """Least and greatest margin of the search [m]."""
+    """Lowest and highest margin of the initial bracket of a search [m]."""
     level: float = 30.0
-    """Contacts towards the worker in 1,000 episodes of 10 s."""
+    """Contacts towards the worker in 1,000 episodes of 10 s at which setups are compared."""
     n_pixels: int = 40
-    """Number of episodes with rendered images, and as many with the emulator; 0: none."""
+    """Number of episodes that are played both with rendered images and with the emulator."""
     n_steps: int | None = None
-    """Control steps of an episode; None: the task's."""
+    """Number of control steps of an episode; None: the time limit of the task."""
     driver: Driver = field(default_factory=Driver)
-    """The agent that drives the robot."""
+    """Agent that controls the robot."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for settings that cannot work."""
+        """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds", "n_fresh", "n_search")
         find_eyes(self.eyes)
         if not self.eyes:
@@ -108,7 +108,7 @@ class Price:
 
     @property
     def tasks(self) -> tuple[str, ...]:
-        """The task with all setups, then the others."""
+        """All tasks, of which the first is played with all setups."""
         return (self.task, *self.others)
 
     def list_cases(self) -> Iterator[Case]:
@@ -118,28 +118,28 @@ class Price:
                 yield Case(name, eyes)
 
     def count_steps(self, task: str) -> int:
-        """Return the control steps of an episode."""
+        """Return the number of control steps of an episode of a task."""
         return self.n_steps or find_task(task).max_episode_steps
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds of the search, and of the episodes that confirm it."""
+        """Seeds of the search and of the episodes that confirm its margin."""
         fresh = self.list_seeds(self.task, self.n_fresh, FIRST_FRESH)
         return self.list_seeds(self.task, self.n_seeds) + fresh
 
     def list_seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
-        """Return one seed per episode for a task.
+        """Return the seeds of a task, one per episode.
 
-        They take as long as `n` episodes of the default task.
+        The episodes take as long as `n` episodes of the default task.
         """
         share = find_task(DEFAULT).max_episode_steps / find_task(task).max_episode_steps
         return [first + k for k in range(max(round(n * share), 1))]
 
     @property
     def n_parts(self) -> int:
-        """Greatest number of search steps and of other episodes.
+        """Greatest number of parts.
 
-        The others are those without a shield and those with rendered images.
+        The parts are search steps, and episodes without a shield or with rendered images.
         """
         n_cases = sum(1 for _ in self.list_cases())
         n_levels = 2 if self.n_pixels and FOUR in self.eyes else 0
@@ -148,7 +148,7 @@ class Price:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """The warning on tables and figures of a short run; "" for other runs."""
         usual, seconds = Price(), self.count_steps(self.task) * DT_S
         if self.n_seeds < usual.n_seeds or self.n_fresh < QUICK_FRESH:
             return describe_quick_run(self.n_seeds, seconds)
@@ -161,12 +161,12 @@ class Price:
         return describe_quick_run(self.n_seeds + self.n_fresh, seconds, consequence=consequence)
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         given = {name: each for name, each in asdict(self).items() if name != "driver"}
         return {"people": PEOPLE, "shield": SHIELD, **given, **self.driver.settings()}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the results of all searches."""
+        """Run all searches and return their results."""
         alone = cache.make_parts([_play_unshielded(self, task) for task in self.tasks])
         unshielded = dict(zip(self.tasks, alone, strict=True))
         searches = [
@@ -191,7 +191,7 @@ class Price:
         """Return the table of all perception setups.
 
         Args:
-            more: columns besides those of the documentation.
+            more: columns in addition to those of the documentation.
         """
         return declaration.make_price_table(
             self.task, find_eyes(self.eyes), self.driver.words, self.n_seeds, self.level, more
@@ -203,7 +203,7 @@ class Price:
 
 
 def _check_task(task: str, agent: str) -> None:
-    """Raise `ConfigError` for a task that the study cannot play."""
+    """Raise `ConfigError` if the study cannot play a task."""
     find_task(task)
     if agent == SCRIPTED and task not in EXPERTS:
         raise ConfigError(
@@ -221,11 +221,11 @@ def make_experiment(
     control: str | None = None,
     trust: bool = False,
 ) -> Price:
-    """Return the experiment with the settings of the command line.
+    """Return the experiment for the options of the command line.
 
-    The quick form has twelve perception setups and the first task. Another task than the default
-    has the setups `ELSEWHERE` if none are given. With an agent of the user's own, only the one task
-    is played.
+    The quick form has twelve perception setups and one task. A task other than the default is
+    played with the setups `ELSEWHERE` if none are given. If an agent is given, only one task is
+    played.
     """
     if len(robots) > 1:
         raise ConfigError(
@@ -248,9 +248,10 @@ def make_experiment(
 
 
 def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generator[Part, Rows, Row]:
-    """Search the margin of one perception setup, and confirm it on fresh seeds.
+    """Search for the margin of one perception setup, and confirm it on fresh seeds.
 
-    Yields the parts that it needs, one after the other, and is sent the rows of each.
+    This generator yields the parts that it needs, one after the other, and is sent the rows of
+    each.
 
     Args:
         config: settings of the study.
@@ -259,7 +260,7 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
         alone: rows of the unshielded robot.
 
     Raises:
-        HRCError: workers moved differently than beside the unshielded robot.
+        HRCError: workers moved differently than with the unshielded robot.
     """
     tried: dict[float, Rows] = {}
     make_part = partial(_make_part, config, task, eyes)
@@ -282,12 +283,12 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
             return row
         yield from measure_rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
     end_m = float(row.evaluate(config.level)[0, 0])
-    # At the last margin of all, throughput is played, not derived from far away.
+    # At the outermost margin, the throughput is measured, not extrapolated from another margin.
     return (yield from confirm(end_m)) if row.ends_at(end_m) else row
 
 
 def _play_unshielded(config: Price, task: str) -> Part:
-    """Return the episodes without a shield."""
+    """Return the part with the episodes without a shield."""
     (eyes,) = find_eyes([TRUTH])
     seeds = config.list_seeds(task, config.n_fresh, FIRST_FRESH)
     return _make_part(config, task, eyes, seeds, 0.0, is_shielded=False)
@@ -296,7 +297,7 @@ def _play_unshielded(config: Price, task: str) -> Part:
 def _compare_levels(
     config: Price, cache: PartCache, table: Mapping[str, Mapping[str, Row]]
 ) -> dict[str, Rows]:
-    """Return the same few episodes with the emulator and with rendered images, by level."""
+    """Play the same few episodes with the emulator and with rendered images; return both."""
     if not config.n_pixels or FOUR not in table[config.task]:
         return {}
     margin_m, levels = table[config.task][FOUR].margin_m, ("keypoints", "pixels")
@@ -310,7 +311,7 @@ def _compare_levels(
 
 
 def _change_level(eyes: Eyes, level: str) -> Eyes:
-    """Return a setup at another perception level, with the level in its name."""
+    """Return a setup with another perception level, which is appended to its name."""
     setup = override(eyes.setup, level=level)
     return override(eyes, name=f"{FOUR}_{level}", setup=setup)
 
@@ -323,7 +324,7 @@ def _make_part(
     margin_m: float,
     is_shielded: bool = True,
 ) -> Part:
-    """Return the episodes with one margin."""
+    """Return the part with the episodes of a setup with one margin."""
     sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
     n_steps, driver = config.count_steps(task), config.driver
     made_of = {
@@ -346,7 +347,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
     Args:
         config: settings of the study.
         cache: cache from which every part is requested.
-        margins_m: margin of each part by its label (`_make_part`) [m].
+        margins_m: margins of the parts by label (`_make_part`) [m].
     """
     parts: list[Part] = []
     for label, margin_m in margins_m.items():
@@ -366,7 +367,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
 
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:
-    """Raise `HRCError` if workers moved differently than beside the unshielded robot.
+    """Raise `HRCError` if workers moved differently than with the unshielded robot.
 
     Tasks in which the worker waits for the robot are exempt.
     """

@@ -1,4 +1,4 @@
-"""Perception setups of the price study: estimator, cameras, latency and errors of all these."""
+"""Perception setups of the price study, with their estimators, cameras, latency and faults."""
 
 import math
 from collections.abc import Collection
@@ -22,23 +22,23 @@ class Eyes:
     """The perception of a robot, and the scale of the covariances that its shield receives."""
 
     name: str
-    """Name in results.json."""
+    """Name of the setup in results.json."""
     words: str
-    """Description in tables and figures."""
+    """Description of the setup in tables and figures."""
     group: str
-    """Group in the figure, one of `GROUPS`."""
+    """Group of the setup in the figure, one of `GROUPS`."""
     setup: PerceptionSetup
     """Level, estimator, cameras and latency."""
     wrong: tuple[Faults, ...] = ((),)
-    """Further faults of cameras; episodes rotate over these."""
+    """Additional faults of cameras, over which episodes rotate."""
     covariance: float = 1.0
     """Factor on the covariances that the shield receives."""
 
     def turns(self, scene: str) -> tuple[Turn, ...]:
-        """Return cameras and their faults, over which episodes rotate.
+        """Return the cameras and faults over which episodes rotate.
 
         Args:
-            scene: name of the scene; its own cameras are used.
+            scene: name of the scene that contains the cameras.
         """
         turns = self.setup.list_turns(RIGS[scene])
         return tuple(
@@ -51,7 +51,7 @@ GROUPS = {
     "latency": "late images", "calibration": "miscalibrated cameras",
     "covariance": "scaled covariances", "fault": "faults",
 }  # fmt: skip
-"""Labels of groups in the figure."""
+"""Labels of the groups of setups in the figure."""
 
 
 def _fail_all(
@@ -76,7 +76,7 @@ def _make_late(latency_s: float, is_told: bool) -> Eyes:
 
 
 def list_eyes() -> dict[str, Eyes]:
-    """Return the setups by name, with every registered estimator for four cameras."""
+    """Return the setups by name, including every registered estimator with four cameras."""
     four, one, degree = PerceptionSetup(), PerceptionSetup(n_cameras=1), math.radians(1.0)
     estimators = (
         Eyes(each, f"four cameras, {each}", "estimator", PerceptionSetup(estimator=each))
@@ -125,12 +125,12 @@ QUICK = (
     TRUTH, FOUR, "paper_restarts", "triangulation", "three_cameras", "two_cameras", ONE,
     "late_120ms", "late_200ms", "late_200ms_untold", "all_turned_1deg", "half_covariance",
 )  # fmt: skip
-"""Twelve setups that answer every question; the figure shows these."""
+"""Names of the twelve setups of the quick form and of the figure."""
 ELSEWHERE = (TRUTH, FOUR, ONE)
-"""Setups of every other task."""
+"""Names of the setups that are compared in every other task."""
 ON_REQUEST = ("kalman", "paper")
-"""Setups on request only: with four cameras `kalman` equals the default; `paper` takes minutes an
-episode."""
+"""Names of setups that are compared only on request: with four cameras, `kalman` equals the
+default, and `paper` takes minutes per episode."""
 
 
 def list_default_eyes() -> tuple[str, ...]:
@@ -139,7 +139,7 @@ def list_default_eyes() -> tuple[str, ...]:
 
 
 def find_eyes(names: Collection[str]) -> list[Eyes]:
-    """Return setups by name; raise `ConfigError` for an unknown name."""
+    """Return the setups with the given names; raise `ConfigError` if a name is unknown."""
     known = list_eyes()
     check_names("perception setup", names, known)
     return [known[name] for name in names]

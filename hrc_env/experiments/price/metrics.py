@@ -1,6 +1,7 @@
-"""Metrics of the price study: the margin of every setup at the level, and its throughput there.
+"""Metrics of the price study: the margin of each setup, and its throughput at that margin.
 
-All setups of a task have the same seeds: differences between two of them are computed draw by draw.
+A setup's margin is the one at which its rate of contacts equals the given level. All setups of a
+task have the same seeds, so that differences between two of them are computed draw by draw.
 """
 
 from collections.abc import Mapping
@@ -27,11 +28,11 @@ from hrc_env.experiments.stage import Rows
 N_DRAWS = 1000
 """Number of bootstrap draws."""
 EPISODE_MIN = 10.0 / 60.0
-"""Length of the episodes in which contacts are given, also if episodes are longer [min]."""
+"""Duration of the episodes in `UNIT`, even if the task has longer episodes [min]."""
 PER = 1000 * EPISODE_MIN
-"""Exposure to which contacts are scaled [min]."""
+"""Exposure to which numbers of contacts are scaled [min]."""
 UNIT = "per 1000 episodes of 10 s"
-"""Unit of contacts."""
+"""Unit of rates of contacts."""
 
 
 class Contrast(NamedTuple):
@@ -59,7 +60,7 @@ CONTRASTS: dict[str, Contrast] = {
     "truth": Contrast(TRUTH, FOUR),
     "calibration_over_accuracy": Contrast("triangulation", "all_turned_1deg"),
 }
-"""Contrasts by name: the share of the better setup minus that of the worse one."""
+"""Contrasts by name; each is the share of the better setup minus that of the worse one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,19 +68,19 @@ class Row:
     """The episodes of one perception setup."""
 
     searched: Mapping[float, Rows]
-    """Sums of episodes by the margins that were tried [m]."""
+    """Sums of episodes, by the margins that were tried [m]."""
     margin_m: float
-    """Margin at which the search places the level [m]."""
+    """Margin found by the search [m]."""
     fresh: Rows
     """Sums of episodes with that margin on fresh seeds."""
 
     def evaluate(self, level: float) -> Floats:
         """Return margin [m] and goals per minute at a level, for all draws of seeds (1 + R, 2).
 
-        The first row counts every seed once.
+        In the first draw, every seed counts once.
 
         Args:
-            level: contacts in `UNIT`.
+            level: rate of contacts in `UNIT`.
         """
         margins_m = sorted(self.searched)
 
@@ -97,13 +98,13 @@ class Row:
         return search.evaluate(level / PER, weights.search, weights.fresh)
 
     def ends_at(self, margin_m: float) -> bool:
-        """Return whether a margin is the least or the greatest that was tried."""
+        """Return whether a margin is the lowest or the highest that was tried."""
         return margin_m in (min(self.searched), max(self.searched))
 
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """All episodes of the experiment."""
+    """All episodes of the study."""
 
     table: Mapping[str, Mapping[str, Row]]
     """Rows by task and perception setup."""
@@ -114,7 +115,7 @@ class Played:
 
 
 def suppose_margin_m(tried: Mapping[float, Rows], level: float) -> float:
-    """Return the margin at which a search places the level, rounded to a millimetre [m]."""
+    """Return the margin at which the rate of contacts is at a level, to the millimetre [m]."""
     margins_m = sorted(tried)
     events, minutes = (
         np.array([np.sum(tried[m][name]) for m in margins_m]) for name in ("towards", "minutes")
@@ -131,7 +132,7 @@ def compute_metrics(played: Played, level: float) -> dict[str, Metric]:
 
     Args:
         played: all episodes.
-        level: contacts in `UNIT` at which setups are compared.
+        level: rate of contacts in `UNIT` at which setups are compared.
     """
     metrics = {
         f"slice.{name}.{key}": metric
@@ -156,7 +157,7 @@ def compute_metrics(played: Played, level: float) -> dict[str, Metric]:
 
 
 def _measure_rates(rows: Rows) -> Metrics:
-    """Return contacts, goals and cost of episodes, with exact intervals of rates."""
+    """Return the rates of contacts and goals and the cost of episodes, with their intervals."""
     per = np.array(rows["minutes"]) / PER
     contacts = {kind: estimate_rate(rows[kind], per, UNIT) for kind in CONTACTS}
     return {
@@ -170,10 +171,10 @@ def _measure_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -
     """Return the metrics of one perception setup.
 
     Args:
-        row: its episodes.
-        drawn: margin and goals per minute at the level (1 + R, 2).
-        share: throughput over that of an unshielded robot (1 + R,).
-        truth: the same share with true joints.
+        row: the episodes of the setup.
+        drawn: margin and goals per minute (1 + R, 2) at the level.
+        share: throughput (1 + R,) as a share of that of an unshielded robot.
+        truth: the same share with true joints, if these were played.
     """
     n, margin_m = len(row.fresh["minutes"]), row.margin_m
     of_truth = (
@@ -190,19 +191,19 @@ def _measure_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -
 
 
 def _draw_rates(rows: Rows) -> Floats:
-    """Return goals per minute for all draws of fresh seeds (1 + R,)."""
+    """Return the goals per minute (1 + R,) for all draws of fresh seeds."""
     minutes = np.array(rows["minutes"])
     fresh = draw_seeds(1, len(minutes), N_DRAWS).fresh
     return np.asarray((fresh @ np.array(rows["achieved"], float)) / (fresh @ minutes))
 
 
 def _divide(above: Floats, below: Floats) -> Floats:
-    """Return the ratio for each draw; NaN if the denominator is 0."""
+    """Return the ratio for each draw, NaN if the denominator is 0."""
     return np.divide(above, below, out=np.full_like(above, np.nan), where=below > 0)
 
 
 def _measure_contrasts(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
-    """Return the differences of all `CONTRASTS` with setups that were played."""
+    """Return the differences of all `CONTRASTS` for which both setups were played."""
     return {
         f"worth.{name}": _make_metric(shares[pair.better] - shares[pair.worse], "share", n)
         for name, pair in CONTRASTS.items()
@@ -211,7 +212,10 @@ def _measure_contrasts(shares: Mapping[str, Floats], n: int) -> dict[str, Metric
 
 
 def _measure_ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
-    """Return the share of draws in which truth keeps the most, and one camera the least."""
+    """Return the share of draws with the order truth, four cameras, one camera, and the losses.
+
+    The order is by decreasing throughput; a loss is the difference from one setup to the next.
+    """
     if not set(ELSEWHERE) <= shares.keys():
         return {}
     truth, four, one = (shares[name] for name in ELSEWHERE)
@@ -224,7 +228,7 @@ def _measure_ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
 
 
 def _make_metric(drawn: Floats, unit: str, n: int) -> Metric:
-    """Return the first draw with the 95 % interval of the others; NaN if it is not finite."""
+    """Return the first draw with the 95 % interval of the others, or NaN if it is not finite."""
     known: Any = drawn[1:][np.isfinite(drawn[1:])]
     if not (np.isfinite(drawn[0]) and known.size):
         return Metric(np.nan, np.nan, np.nan, unit, n)

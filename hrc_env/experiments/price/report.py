@@ -1,4 +1,4 @@
-"""The report of the price study: bars of remaining throughput, margins and contrasts."""
+"""The report of the price study: bar chart of throughput, margins and contrasts."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ COLOURS = {
     "truth": "0.25", "estimator": "#2f6db3", "cameras": "#3a9a8f", "latency": "#d1793b",
     "calibration": "#b23a48", "covariance": "#8a6bb8", "fault": "#8c7a4f",
 }  # fmt: skip
-"""Colours of groups."""
+"""Colours of the groups of setups in the figure."""
 
 
 def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics) -> Report:
@@ -31,7 +31,7 @@ def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics
     Args:
         figures: folder of the figure.
         config: settings of the study.
-        played: its episodes.
+        played: episodes of the study.
         metrics: metrics by name.
     """
     task, table = config.task, played.table
@@ -64,7 +64,7 @@ def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics
 
 
 def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
-    """Return a note on setups with a level beyond the margins tried; "" if there are none."""
+    """Return a note on setups that do not reach the level at the margins tried; "" if all do."""
     margins_m = {name: metrics[f"{task}.{name}.margin_m"].value for name in rows}
     beyond = [f"`{name}`" for name, row in rows.items() if row.ends_at(margins_m[name])]
     if not beyond:
@@ -85,16 +85,16 @@ def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) ->
 
 
 def choose_bars(metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> list[Eyes]:
-    """Return the setups of the figure, in increasing order of throughput; of many only `QUICK`."""
+    """Return the setups of the figure by increasing throughput; if there are many, only `QUICK`."""
     shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
     return sorted(shown, key=lambda each: metrics[f"{task}.{each.name}.share"].value)
 
 
 def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], level: float) -> None:
-    """Draw a bar for each perception setup, the longest on top; of many only `QUICK`.
+    """Draw a bar for each setup of `choose_bars`, with the longest on top.
 
     Args:
-        path: file of the picture.
+        path: picture file to write.
         metrics: metrics by name.
         task: id of the environment.
         eyes: setups that have metrics in the task.

@@ -1,11 +1,12 @@
-"""The search of the margin at which a rate falls to a level, by bisection, and its evaluation.
+"""Search by bisection for the margin at which a rate falls to a level, and its evaluation.
 
-A search evaluates margins on the same seeds, so that margins differ by their effect and not by
-their draws (common random numbers): it halves a bracket until noise is wider, and takes a margin on
-either side. At the margin found, fresh seeds are played. These give the height of the curve there;
-the search gives its shape beside it: y(m) = y_fresh(m_0) y_search(m) / y_search(m_0), a ratio
-estimator of two samples (Cochran 1977, Sampling Techniques, ch. 12). As the search chose the
-margin, its own seeds do not affect the height of the curve.
+A search evaluates all margins on the same seeds, so that rates differ by the effect of the margin
+and not by random draws (common random numbers). It bisects a bracket a fixed number of times, and
+then tries the ends of the bracket and one margin beyond either end. Fresh seeds are played with the
+margin found. These give the height of the curve there, and the search gives its shape around it:
+y(m) = y_fresh(m_0) y_search(m) / y_search(m_0), a ratio estimator of two samples (Cochran 1977,
+Sampling Techniques, ch. 12). The seeds of the search do not affect the height of the curve, because
+they were used to choose the margin.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -23,7 +24,7 @@ RequestT = TypeVar("RequestT")
 AnswerT = TypeVar("AnswerT")
 ResultT = TypeVar("ResultT")
 HALF = 0.5
-"""Events added to counts before their logarithm is taken."""
+"""Number of events added to counts before their logarithm is taken."""
 
 
 def search(
@@ -33,7 +34,7 @@ def search(
     level: float,
     n_steps: int,
 ) -> Generator[RequestT, AnswerT, list[float]]:
-    """Evaluate a falling rate at `n_steps` bisections of a bracket and at margins beside it.
+    """Evaluate a decreasing rate at `n_steps` bisections of a bracket and at arguments nearby.
 
     Args:
         rate: generator function that evaluates the rate at an argument; its requests are yielded.
@@ -43,7 +44,8 @@ def search(
         n_steps: number of bisections.
 
     Returns:
-        All arguments that were tried; the last are the ends of the bracket and one beyond either.
+        All arguments that were tried; the last are the ends of the final bracket and one argument
+            beyond either end.
     """
     tried: list[float] = []
     for _ in range(n_steps):
@@ -64,11 +66,11 @@ def run_together(
     searches: Sequence[Generator[RequestT, AnswerT, ResultT]],
     answer: Callable[[list[RequestT]], list[AnswerT]],
 ) -> list[ResultT]:
-    """Run searches side by side, one step of each in a round, and return their results.
+    """Run searches in parallel, one step of each per round, and return their results.
 
     Args:
         searches: generators that yield requests and are sent the answers.
-        answer: returns the answers to all requests of a round, in their order.
+        answer: function that returns the answers to all requests of a round, in their order.
     """
     results: dict[int, ResultT] = {}
     answers: dict[int, Any] = dict.fromkeys(range(len(searches)))
@@ -84,7 +86,7 @@ def run_together(
 
 
 def fit_falling_rates(events: Floats, minutes: Floats) -> Floats:
-    """Return logarithms of rates (K,), fitted so that they fall, from counts and minutes (K,)."""
+    """Fit decreasing rates to counts and minutes (K,), and return their logarithms (K,)."""
     rates = np.log((events + HALF) / minutes)
     return np.asarray(isotonic_regression(rates, increasing=False).x)
 
@@ -96,29 +98,29 @@ class MarginSearch:
     margins_m: Floats
     """Margins (K,) in increasing order [m]."""
     events: Floats
-    """Events (K, n), which become rarer as the margin grows."""
+    """Numbers of events (K, n), which decrease as the margin grows."""
     achieved: Floats
-    """Goals (K, n)."""
+    """Numbers of goals (K, n)."""
     minutes: Floats
     """Durations (K, n) [min]."""
     fresh_margin_m: float
-    """Margin of the fresh seeds [m]."""
+    """Margin with which the fresh seeds were played [m]."""
     fresh_events: Floats
-    """Events of fresh seeds (m,)."""
+    """Numbers of events (m,) on fresh seeds."""
     fresh_achieved: Floats
-    """Goals of fresh seeds (m,)."""
+    """Numbers of goals (m,) on fresh seeds."""
     fresh_minutes: Floats
-    """Durations of fresh seeds (m,) [min]."""
+    """Durations (m,) of the episodes on fresh seeds [min]."""
 
     def evaluate(self, level_per_min: float, drawn: Ints, fresh: Ints) -> Floats:
         """Return the margin [m] at which events fall to a level, and goals per minute there (R, 2).
 
-        A margin beyond those that were tried is the last of them.
+        A margin beyond those that were tried is replaced by the outermost of them.
 
         Args:
-            level_per_min: events per minute.
-            drawn: number of times that each seed of the search counts (R, n).
-            fresh: number of times that each fresh seed counts (R, m).
+            level_per_min: level of the rate [events per minute].
+            drawn: number of times (R, n) that each seed of the search counts.
+            fresh: number of times (R, m) that each fresh seed counts.
         """
         m, m_0, level = self.margins_m, self.fresh_margin_m, np.log(level_per_min)
         minutes, fresh_minutes = drawn @ self.minutes.T, fresh @ self.fresh_minutes
@@ -134,16 +136,16 @@ class MarginSearch:
 
 
 class SeedWeights(NamedTuple):
-    """The number of times that each seed counts, in 1 + R draws; in the first each counts once."""
+    """The number of times that each seed counts in 1 + R draws; in the first, each counts once."""
 
     search: Ints
-    """Seeds of the search (1 + R, n)."""
+    """Weights (1 + R, n) of the seeds of the search."""
     fresh: Ints
-    """Fresh seeds (1 + R, m)."""
+    """Weights (1 + R, m) of the fresh seeds."""
 
 
 def draw_seeds(n: int, m: int, n_draws: int) -> SeedWeights:
-    """Return draws of n seeds of a search and of m fresh ones, the same in every call.
+    """Return draws of n seeds of a search and of m fresh seeds, which are the same in every call.
 
     Rows that share their seeds can therefore be compared draw by draw.
     """

@@ -13,10 +13,10 @@ SHIELD = "qp"
 
 @dataclass(slots=True)
 class Widened:
-    """`SHIELD` for a robot with capsules that are thicker by a margin, which may be negative.
+    """The shield `SHIELD` for a robot with capsules that are thickened by a margin.
 
-    The distance between any of its capsules and any body grows by the margin. The shield receives
-    the estimator's covariances times `covariance`.
+    All protective distances therefore grow by the margin, which may be negative. The shield
+    receives the estimator's covariances multiplied by `covariance`.
     """
 
     covariance: float = 1.0

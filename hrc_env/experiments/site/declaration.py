@@ -16,10 +16,10 @@ four-camera track): of one camera or four from the first frame on, as in the pap
 second and then of some. Errors are of every frame after that second, including those of lost
 tracks."""
 ESTIMATORS = ("particle", "paper")
-"""Default estimators, which also have cameras alone from the first frame on, and their own
-crops."""
+"""Default estimators, which are also evaluated with single cameras from the first frame on, and
+with crops that follow the estimator itself."""
 ALSO = ("kalman", "paper_restarts")
-"""Estimators that are also replayed on the film, so that single cameras get the best one."""
+"""Further estimators that are replayed on the film, among them the best one for one camera."""
 PAPER_RMSE_M = {
     "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
 }  # fmt: skip
@@ -33,7 +33,7 @@ NUMBERS = {
 
 
 def list_estimators(estimators: tuple[str, ...]) -> tuple[str, ...]:
-    """Return all estimators that are replayed on the film, the requested ones first."""
+    """Return all estimators that are replayed on the film, beginning with the requested ones."""
     return tuple(dict.fromkeys((*estimators, *ALSO)))
 
 
@@ -42,7 +42,7 @@ def make_errors_table(estimators: tuple[str, ...], seconds: float) -> Table:
 
     Args:
         estimators: requested estimators.
-        seconds: length of a walk [s].
+        seconds: duration of a walk [s].
     """
     first = estimators[0]
     rows = {
@@ -72,7 +72,7 @@ class Comparisons(NamedTuple):
     differences: Table
     """Differences from the first estimator."""
     ratios: Table
-    """Errors of one camera over those of four."""
+    """Errors of one camera divided by those of four."""
 
 
 def make_comparison_tables(estimators: tuple[str, ...]) -> Comparisons:

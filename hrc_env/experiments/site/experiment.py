@@ -1,4 +1,4 @@
-"""The site study: walks are filmed once, and all estimators are replayed on the same film."""
+"""The site study, which films walks once and replays all estimators on the same film."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -31,34 +31,35 @@ from hrc_env.tracking.estimators import ESTIMATORS as KNOWN
 HEAD = JOINT["nose"]
 """The paper's "head", for which MediaPipe has no joint (judgement: the nose)."""
 CROPS = "particle"
-"""Estimator that the crops of the shared film follow."""
+"""Name of the estimator that the crops of the shared film follow."""
 SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
-"""Settings with a wide prior, as walks go far from the middle of the workplaces."""
+"""Configuration with a wide prior, as walks lead far from the centre of the workplaces."""
 ALONE = "alone."
-"""Prefix of keys: cameras that are alone from the first frame on, as in the paper."""
+"""Prefix of keys if only a row's cameras are used from the first frame on, as in the paper."""
 ROWS = tuple(CHOICES)
-"""Each camera alone, and all four."""
+"""Names of the rigs: each camera alone, and all four."""
 
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """The experiment, and the amount of data that is recorded."""
+    """The site study and its settings."""
 
     name = "site"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     n_seeds: int = 9
     """Number of walks."""
     first_seed: int = 100
-    """Seed of the first walk; later ones count up."""
+    """Seed of the first walk; it increases by one with each further walk."""
     seconds: float = 20.0
-    """Length of a walk [s]."""
+    """Duration of a walk [s]."""
     estimators: tuple[str, ...] = ESTIMATORS
-    """Estimators of the table, which also get their own crops."""
+    """Estimators in the table, which are also evaluated with crops that follow them."""
     n_closed: int = 2
-    """Number of walks that are filmed again for every estimator's own crops, which costs most."""
+    """Number of walks that are filmed again with crops that follow each estimator; these take most
+    of the time."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for settings that cannot work."""
+        """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
             raise ConfigError(f"--estimator needs a name of {', '.join(KNOWN)}.")
@@ -76,22 +77,22 @@ class Site:
 
     @property
     def n_parts(self) -> int:
-        """Number of films, and of walks with own crops."""
+        """Number of shared films, and of those with crops that follow an estimator."""
         n_closed = len(self.seeds[: self.n_closed])
         return self.n_seeds + len(self.estimators) * len(ROWS) * n_closed
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
+        """The warning on tables and figures of a short run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on."""
+        """Return the settings on which all numbers depend."""
         return {**asdict(self), "also": ALSO, "crops": CROPS}
 
     def play(self, cache: PartCache) -> "Played":
-        """Return all walks; they are filmed once, and some again with estimators' own crops."""
+        """Film all walks once, and some again with crops that follow each estimator."""
         films = [Part(f"film.{seed}", partial(film_walk, self, seed)) for seed in self.seeds]
         rows = [*product(self.estimators, ROWS, self.seeds[: self.n_closed])]
         parts = [
@@ -109,7 +110,7 @@ class Site:
         return compute_metrics(self, played)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table for the documentation."""
         return (declaration.make_errors_table(self.estimators, self.seconds),)
 
     def report(self, played: "Played", metrics: Metrics, figures: Path) -> Report:
@@ -119,13 +120,13 @@ class Site:
 
 
 QUICK = Site(n_seeds=2, seconds=6.0, n_closed=1)
-"""The quick form: every number, from fewer and shorter walks."""
+"""The quick form, with fewer and shorter walks."""
 
 
 def make_experiment(
     quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ESTIMATORS
 ) -> Site:
-    """Return the experiment with the settings of the command line."""
+    """Return the experiment for the options of the command line."""
     names = tuple(dict.fromkeys(estimator))
     return override(QUICK if quick else Site(), estimators=names, n_seeds=seeds)
 
@@ -140,11 +141,11 @@ class Played(NamedTuple):
     films: Mapping[int, Walk]
     """Shared films with the estimates of all estimators, by seed."""
     closed: Mapping[str, Mapping[int, Walk]]
-    """Walks with the estimator's own crops, by row and seed."""
+    """Walks with crops that follow the estimator, by row and seed."""
 
 
 def film_walk(config: Site, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """Return the estimates on one walk, filmed with the crops of the four-camera track."""
+    """Film one walk with the crops of the four-camera track, and return all estimates of it."""
     motions = walk(make_site(), seed, round(config.seconds / DT_S), DT_S)
     settings = SETTINGS
     recording = record(make_site(), motions, settings, CROPS, seed, lambda share: tick(0.7 * share))
@@ -162,16 +163,16 @@ def film_walk(config: Site, seed: int, tick: PartProgress) -> dict[str, Any]:
 
 
 def _find_first_detection(recording: Recording) -> int:
-    """Return the first frame in which a camera detects the worker, who may begin out of sight."""
+    """Return the index of the first frame in which a camera detects the worker."""
     return int(np.argmax((recording.keypoints.confidence > 0).any((1, 2, 3))))
 
 
 def film_own_crops(
     config: Site, estimator: str, row: str, seed: int, tick: PartProgress
 ) -> dict[str, Any]:
-    """Return the estimates on a walk with crops that follow the estimator.
+    """Film a walk with crops that follow an estimator, and return its estimates.
 
-    Some cameras fail early.
+    The cameras that are not in the row fail after the warm-up.
     """
     settings = replace(SETTINGS, faults=make_turns("site", [CHOICES[row]])[0].faults)
     motions = walk(make_site(), seed, round(config.seconds / DT_S), DT_S)
@@ -180,7 +181,7 @@ def film_own_crops(
 
 
 def _extract_head_path(beliefs: PoseEstimate) -> dict[str, Any]:
-    """Return the estimated head (T, 3) [m], and whether it is tracked (T,), for JSON."""
+    """Return the estimated path (T, 3) of the head [m] and the mask (T,) of tracked frames."""
     return {
         "head": np.round(beliefs.mean_world[:, 0, HEAD], 4).tolist(),
         "tracked": beliefs.tracked[:, 0].astype(int).tolist(),
@@ -220,7 +221,7 @@ def compute_metrics(config: Site, played: Played) -> dict[str, Metric]:
 
 
 def _square_m2(film: Walk, row: Walk) -> Floats:
-    """Return squared errors of the head in the frames that are evaluated (T,) [m^2].
+    """Return the squared errors (T,) of the head in the frames that are evaluated [m^2].
 
     If the track is lost, the estimator's last estimate, or its prior, is evaluated.
     """

@@ -1,4 +1,4 @@
-"""The report of the site study: the paper's figures 3 and 4 from our own data, and the tables."""
+"""The report of the site study: the paper's figures 3 and 4 with data of the study, and tables."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -44,7 +44,7 @@ def make_report(
         figures: folder of the figures.
         estimators: estimators whose paths are drawn.
         films: films by seed.
-        tables: tables; the first is that of errors.
+        tables: tables of the report, beginning with that of errors.
         metrics: metrics by name.
     """
     seed, film = next(iter(films.items()))
@@ -70,7 +70,7 @@ def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
     """Draw the site from above with its cameras and the first walk, and the view of each camera.
 
     Args:
-        path: file of the picture.
+        path: picture file to write.
         scene: the site.
         seed: seed of the walk.
         path_world: path of the head (T, 3) [m].
@@ -107,11 +107,11 @@ def draw_paths(
     """Draw the head's path in the first walk from above, for each camera alone and for all.
 
     Args:
-        path: file of the picture.
+        path: picture file to write.
         scene: the site.
         estimator: name of the estimator.
         truth: true path (T, 3) [m].
-        heads: estimated paths (T, 3) by cameras [m].
+        heads: estimated paths (T, 3) [m], by the cameras used.
     """
     figure = make_figure(16, 3.7)
     eyes = np.stack([camera.eye_world for camera in scene.cameras])

@@ -1,4 +1,4 @@
-"""The walk of the site study: from workplace to workplace, behind and past obstacles."""
+"""The walk of the site study, from workplace to workplace, behind and past obstacles."""
 
 import numpy as np
 
@@ -20,14 +20,14 @@ PASSING = MotionConfig(
     jobs=tuple(Job(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
     people=generator.PEOPLE["unaware"],
 )
-"""Motion of workers who leave a workplace as soon as they reach it.
+"""Settings of motion with which workers leave each workplace as soon as they reach it.
 
-This is a judgement: the paper only writes "walked".
+They are a judgement: the paper only states that the worker walked.
 """
 
 
 def walk(scene: Scene, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
-    """Return a worker's walk (T, 1, S, ...) in steps of `dt_s`."""
+    """Return a worker's walk (T, 1, S, ...) at intervals of `dt_s`."""
     state = generator.make_state(1, 1, load_body(scene.bodies[0]), PASSING, scene.grounds)
     rngs = [np.random.default_rng(seed)]
     generator.reset(state, np.arange(1), rngs)

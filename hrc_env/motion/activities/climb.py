@@ -1,4 +1,4 @@
-"""Climbing a step or a low ladder and coming down backwards; looking round on the spot."""
+"""Climbing a step or low ladder and descending backwards; looking round on the spot."""
 
 import math
 
@@ -14,26 +14,26 @@ from hrc_env.motion.state import Worker
 HIGHEST_RISER_M = 0.32
 """Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
 FIRST_M = 0.40
-"""Distance from the stance to the first tread [m]."""
+"""Distance from the initial stance to the first tread [m]."""
 TREAD_M = 0.24
 """Distance from tread to tread [m]."""
 STEP_AT_S = 0.12
-"""Time of a climber's first lift-off [s]; judgement."""
+"""Time at which a climber's first foot lifts off [s]; judgement."""
 PERIOD_S = 0.72
 """Period of a climber's steps [s]; judgement."""
 SWING_S = 0.56
-"""Time that a climber's foot is in the air [s]; judgement."""
+"""Swing time of a climber's foot [s]; judgement."""
 TURN_S = 0.75
 """Time to turn the head from one side to the other [s]; judgement."""
 
 
 @kernel
 def climb(t: float, worker: Worker) -> None:
-    """Let a standing worker climb, stay, and come down the way they went up.
+    """Add a climb to the pose of a standing worker: up, a stay, and down in reverse.
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q = worker.q
     up_s, treads = worker.up_s, worker.treads
@@ -52,12 +52,12 @@ def climb(t: float, worker: Worker) -> None:
 
 @kernel
 def start_climb(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to climb to a height.
+    """Plan to climb to a height and come down again.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height to climb to [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -83,7 +83,7 @@ def start_climb(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def look_round(t: float, worker: Worker) -> None:
-    """Let a standing worker look about."""
+    """Add looking to both sides to the pose of a standing worker."""
     q = worker.q
     there, across = min_jerk(t / TURN_S), min_jerk((t - worker.left_s) / TURN_S)
     back = min_jerk((t - worker.right_s) / TURN_S)
@@ -95,12 +95,12 @@ def look_round(t: float, worker: Worker) -> None:
 
 @kernel
 def start_look_round(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to look round; the height has no effect.
+    """Plan to look to both sides; the height has no effect.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

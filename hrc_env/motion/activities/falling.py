@@ -1,7 +1,8 @@
-"""Falling: a walker's foot is caught, hands go out, and knees, hands and trunk come to the floor.
+"""Falling in a walk: a foot is caught, and hands, knees and trunk come down to the floor.
 
-The worker lies there, and gets up over hands and knees and one foot. Between two of `POSES` runs a
-monotone cubic of Fritsch & Butland (1984, doi:10.1137/0905021), so nothing overshoots.
+The worker lies on the floor, and gets up via hands and knees and one foot. `POSES` are
+interpolated by the monotone cubic of Fritsch & Butland (1984, doi:10.1137/0905021), which does
+not overshoot.
 """
 
 import math
@@ -30,23 +31,29 @@ from hrc_env.motion.walk import (
     write_footprint,
 )
 
+_STEPS_BEFORE, _STEPS_AFTER = 2, 3
+"""Least numbers of steps of a walk before and after the step in which a foot is caught."""
+_LAST_STEPS = 2
+"""Number of footprints that a fall adds after that of the caught foot, for standing up again."""
 PELVIS_X, PELVIS_Z, PITCH, ROLL, FLEX, NOD, TURN, GRASP, ELBOWS, KNEES = range(10)
-"""Columns of `PLACES` for the trunk, in lengths of a leg of `LEG_M` and radians.
+"""Columns of `PLACES` for the trunk, in radians, and in metres for a leg of length `LEG_M`.
 
-Pelvis ahead of the stumble and its height, its pitch, the share of lying on a side, flexion of the
-spine, pitch and turn of the head; shares of the hands' targets, elbows and knees outwards.
+They are: position of the pelvis ahead of the stumble, its height and pitch; share of lying on a
+side; flexion of the spine; pitch and yaw of the head; share by which the hands follow their
+targets; degrees to which elbows and knees point outwards.
 """
 HANDS = 10
-"""First of three columns for a hand: ahead, outwards, height; the rising foot's side first."""
+"""First of three columns per hand: ahead, outwards, height; the side of the rising foot first."""
 FEET = 16
-"""First of five columns for a foot: the rising foot's, then the other's.
+"""First of five columns per foot: those of the rising foot, then those of the other foot.
 
-Ball of the foot ahead, outwards and above that of a standing foot, pitch of foot and of toes.
+They are: position of the ball of the foot ahead, outwards, and above that of a standing foot;
+pitch of the foot and of the toes.
 """
 FREED = 26
-"""Column for the share by which the feet have left their footprints."""
+"""Column of the share by which the feet have left their footprints."""
 RISEN = 27
-"""First of two columns for the share by which each foot stands where the worker gets up."""
+"""First of two columns: share by which each foot stands at its final footprint."""
 _PUSHED, _STEM = (1.42, 0.38, 0.12), (1.42, 0.36, 0.14)
 POSES = np.array([
     # time, pelvis x z, pitch, roll, flex, nod, turn, grasp, elbows, knees, hands, feet, shares
@@ -77,40 +84,40 @@ POSES = np.array([
     (5.70, 1.22, 0.957, 0.02, 0, 0.05, 0.05, 0.0, 0, 0.2, 0.0, 1.42, 0.22, 0.84, 1.2, 0.36, 0.74,
      1.30, 0.12, 0.0, 0.0, 0.0, 1.30, 0.12, 0.0, 0.0, 0.0, 1, 1, 1),
 ])  # fmt: skip
-"""Poses of a fall: time [s], then the columns of `PLACES`."""
+"""Key poses of a fall: time [s], followed by the columns of `PLACES`."""
 TIMES_S = POSES[:, 0].copy()
-"""Times of the poses [s]."""
+"""Times of the key poses [s]."""
 PLACES = POSES[:, 1:].copy()
-"""Poses without their times."""
+"""Key poses without their times."""
 LIES_S = 1.2
 """Time in `POSES` at which the worker lies [s]."""
 STANDS_S = 5.7
 """Time in `POSES` at which the worker stands again [s]."""
 THROWN_S = 0.32
-"""Time in which a walk becomes a fall [s]."""
+"""Time of the transition from walking to falling [s]."""
 ERECT_S = 0.7
-"""Time in which the last pose becomes standing [s]."""
+"""Time of the transition from the last key pose to standing [s]."""
 CAUGHT_AT = 0.7
 """Share of the caught foot's swing at which it is caught; judgement."""
 CAUGHT_LEGS = 0.14
-"""Distance at which the caught foot lands before the other, in lengths of the leg; judgement."""
+"""Distance by which the caught foot lands ahead of the other, in leg lengths; judgement."""
 RISES_AT = 1.22
-"""Distance from the stumble to where the worker stands again, in lengths as in `POSES`."""
+"""Distance from the stumble to the final standing position, in the lengths of `POSES`."""
 TALL = 1.7
-"""Distance from the stumble that head and hands reach, in lengths as in `POSES`."""
+"""Reach of head and hands from the stumble, in the lengths of `POSES`."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
-"""Directions of a fall, from the heading, that are tried for room [rad]."""
+"""Directions of a fall relative to the heading, tried in turn until there is room [rad]."""
 QUICKEST = 1.15
 """Greatest rate of a fall relative to `POSES`."""
 SLOWEST = 0.9
 """Least rate of a fall relative to `POSES`."""
 MOST_ROLL_RAD = 0.9
-"""Greatest turn of a lying trunk onto a side [rad]."""
+"""Greatest roll of a lying trunk onto a side [rad]."""
 
 
 @kernel
 def _find_slope(k: int, column: int) -> float:
-    """Return the rate of a column at pose k."""
+    """Return the slope of a column at key pose k."""
     if k == 0 or k == PLACES.shape[0] - 1:
         return 0.0
     before, after = TIMES_S[k] - TIMES_S[k - 1], TIMES_S[k + 1] - TIMES_S[k]
@@ -124,7 +131,7 @@ def _find_slope(k: int, column: int) -> float:
 
 @kernel
 def _interpolate(at: float, column: int) -> float:
-    """Return a column of `POSES` at a time."""
+    """Interpolate a column of `PLACES` at a time of `POSES` [s]."""
     k = 0
     while k < PLACES.shape[0] - 2 and TIMES_S[k + 1] <= at:
         k += 1
@@ -137,19 +144,19 @@ def _interpolate(at: float, column: int) -> float:
 
 @kernel
 def _to_pose_time(since: float, worker: Worker) -> float:
-    """Return the time in `POSES` a time `since` [s] after the foot was caught."""
+    """Convert the time [s] since the foot was caught to the time in `POSES` [s]."""
     down = worker.fall_pace * since
     return min(down, LIES_S) + max(since - LIES_S / worker.fall_pace - worker.lie_s, 0.0)
 
 
 @kernel
 def fall(t: float, clock_s: float, worker: Worker) -> None:
-    """Change the feet, and the whole posture, into those of falling and getting up again.
+    """Write the control vector of walking, falling and getting up again.
 
     Args:
         t: time since the activity began [s].
         clock_s: time since the episode began [s].
-        worker: record with the plan; its `q` holds the feet of the walk and is written.
+        worker: record with the plan; its `q`, which holds the walking feet, is written.
     """
     at = _to_pose_time(t - worker.trip_at, worker)
     if at <= LIES_S:
@@ -177,12 +184,12 @@ def fall(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _fall_trunk(at: float, share: float, worker: Worker) -> None:
-    """Change root, pelvis, spine and head by a share into those of the fall.
+    """Blend root, pelvis, spine and head with those of the fall.
 
     Args:
         at: time in `POSES` [s].
-        share: share of the fall in the posture.
-        worker: record; its `q` is changed.
+        share: weight of the fall in the posture.
+        worker: record of the worker; its `q` is changed.
     """
     q, scale = worker.q, worker.lengths[LEG] / LEG_M
     side = 1.0 - 2.0 * worker.front
@@ -203,14 +210,14 @@ def _fall_trunk(at: float, share: float, worker: Worker) -> None:
 
 @kernel
 def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -> None:
-    """Move a foot from its footprint onto its ball, away, and to where the worker gets up.
+    """Move a foot from its footprint onto the ball, with the body, and to its final footprint.
 
     Args:
         at: time in `POSES` [s].
         side: 0 left, 1 right.
         column: first column of the foot in `POSES`.
         sign: 1 on the left, -1 on the right.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, ankle = worker.q, c.ANKLE + 6 * side
     scale, length, low = worker.lengths[LEG] / LEG_M, worker.lengths[BALL_X], worker.lengths[BALL_Z]
@@ -243,45 +250,52 @@ def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -
 def plan_fall(
     draws: Floats, end_yaw: float, pace_m_s: float, lie_s: float, grid: FloorGrid, worker: Worker
 ) -> float:
-    """Plan to fall on the way along the path that is laid.
+    """Plan a walk along the worker's path with a fall on the way, and getting up again.
+
+    The steps are tried cyclically from a random one on, each in the directions `TURNS_RAD`, until
+    the floor has room for a fall.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        end_yaw: heading at the end of the path [rad].
+        draws: (N_START,) uniform draws in [0, 1): 0 the step, 1 the rate of the fall, 2 the roll of
+            the lying trunk, 3 the foot on which the worker gets up first.
+        end_yaw: heading at the end of the path [rad], in the world frame.
         pace_m_s: walking speed [m/s].
-        lie_s: time to lie on the floor [s].
-        grid: free distance on the floor.
-        worker: record with the path; the plan is written into it.
+        lie_s: time for which the worker lies on the floor [s].
+        grid: slack on the floor.
+        worker: record with the path; the plan is written into it, even if a fall has no room.
 
     Returns:
-        The duration [s]; -1 where there is no room.
+        The duration [s]; -1 if there is no room for a fall, or the path is too short or too long.
     """
     plan_walk(end_yaw, pace_m_s, worker)
-    n = worker.step_count - 5
-    if worker.follow == 0.0 or n < 1 or worker.step_count > MAX_STEPS - 2:
+    n_candidates = worker.step_count - (_STEPS_BEFORE + _STEPS_AFTER)
+    is_side_stepping = worker.follow == 0.0
+    has_space = worker.step_count <= MAX_STEPS - _LAST_STEPS
+    if is_side_stepping or n_candidates < 1 or not has_space:
         return -1.0
     worker.fall_pace, worker.lie_s = scale_draw(draws[1], SLOWEST, QUICKEST), lie_s
     worker.lie_roll = MOST_ROLL_RAD * (2.0 * draws[2] - 1.0)
     worker.front = 1 if draws[3] < 0.5 else 0
-    first = int(draws[0] * n)
-    for k in range(n):
-        for turn in TURNS_RAD:
-            if _plan_stumble(2 + (first + k) % n, turn, grid, worker):
-                worker.total_s = (
-                    worker.trip_at + LIES_S / worker.fall_pace + lie_s + STANDS_S - LIES_S
-                )
+    first = int(draws[0] * n_candidates)
+    for k in range(n_candidates):
+        step = _STEPS_BEFORE + (first + k) % n_candidates
+        for turn_rad in TURNS_RAD:
+            if _plan_stumble(step, turn_rad, grid, worker):
+                down_s = LIES_S / worker.fall_pace
+                # getting up takes the rest of the time in POSES
+                worker.total_s = worker.trip_at + down_s + lie_s + STANDS_S - LIES_S
                 return worker.total_s
     return -1.0
 
 
 @kernel
 def _plan_stumble(step: int, turn: float, grid: FloorGrid, worker: Worker) -> bool:
-    """Plan to fall in a step, turned from the path, if there is room.
+    """Plan to fall in a given step and direction, if there is room.
 
     Args:
         step: index of the step in which the foot is caught.
         turn: angle of the fall from the heading [rad].
-        grid: free distance on the floor.
+        grid: slack on the floor.
         worker: record with the walk; the plan is written into it.
 
     Returns:
@@ -316,7 +330,7 @@ def _plan_stumble(step: int, turn: float, grid: FloorGrid, worker: Worker) -> bo
 
 @kernel
 def predict_fallen_root(t: float, worker: Worker) -> Point:
-    """Return the approximate root on the floor at time t of a fall, and after it."""
+    """Predict the approximate root on the floor at time t of a fall, also after its end."""
     at = _to_pose_time(t - worker.trip_at, worker)
     if at <= 0.0:
         return locate_on_path(measure_travel(t, worker), worker)

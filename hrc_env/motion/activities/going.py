@@ -1,4 +1,4 @@
-"""Going somewhere: turning, stumbling, a few quick steps back, pushing a cart."""
+"""Locomotion other than plain walking: turns, stumbles, steps back, and pushing a cart."""
 
 import math
 
@@ -23,11 +23,11 @@ WHEELBARROW = PROP_NAMES.index("wheelbarrow")
 CART_AHEAD_M = 0.47
 """Distance of a cart's handles ahead of the root [m]."""
 WHEELBARROW_AHEAD_LEGS = 0.26
-"""Distance of a level wheelbarrow's handles ahead of the root, in lengths of the leg."""
+"""Distance of a level wheelbarrow's handles ahead of the root, in leg lengths."""
 PUSHING_SHARE = 0.99
-"""Share of the arm's length to which arms are stretched in pushing."""
+"""Extension of the arms in pushing, as a share of their length."""
 STOOPED_M = 0.4
-"""Distance by which a lean of 1 brings the shoulders forward [m]."""
+"""Forward displacement of the shoulders at a lean of 1 [m]."""
 CART_LEAN = 0.06
 """Least lean in pushing a cart."""
 WHEEL_AHEAD_M = 1.2
@@ -35,26 +35,26 @@ WHEEL_AHEAD_M = 1.2
 WHEEL_UP_M = 0.17
 """Height of a wheelbarrow's axle above its origin [m]."""
 STANDS_RAD = 0.2
-"""Tilt of a wheelbarrow that stands on its legs [rad]."""
+"""Pitch of a wheelbarrow that stands on its legs [rad]."""
 KNUCKLES_SHARE = 0.97
-"""Height of carried handles as a share of the pelvis's height."""
+"""Height of a wheelbarrow's raised handles as a share of pelvis height."""
 BEND = 1.3
-"""Lean to take the handles of a wheelbarrow; judgement."""
+"""Lean to grasp the handles of a wheelbarrow; judgement."""
 TAKE_S = 0.7
-"""Time for the hands to go to the handles [s]."""
+"""Time for the hands to reach the handles [s]."""
 LIFT_S = 0.5
 """Time to lift a wheelbarrow by its handles [s]."""
 STEP_BACK_PACE = Pace(0.0, 0.62, 0.42)
 """Pace of quick steps back; judgement."""
 TURN_PACE = Pace(0.0, 0.2, 0.36)
-"""Pace of turning on the spot without one foot stepping on the other; judgement."""
+"""Pace of turning on the spot, slow enough that the feet do not collide; judgement."""
 CAUGHT_LEGS = 0.115
-"""Shortening of the step in which a foot catches, in lengths of the leg; judgement."""
+"""Shortening of the step in which a foot is caught, in leg lengths; judgement."""
 
 
 @kernel(makes_arrays=True)
 def start_turn(yaw: float, worker: Worker) -> float:
-    """Plan to turn on the spot to a heading [rad]; return the duration [s]."""
+    """Plan to turn on the spot to a heading [rad], and return the duration [s]."""
     here = Point(worker.start_x, worker.start_y)
     lay_path(here, np.empty((0, 3)), here, worker)
     return plan_pace(TURN_PACE, yaw, worker)
@@ -67,7 +67,7 @@ def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -80,7 +80,7 @@ def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, worker: Worker) -> float:
-    """Plan a walk along the path that is laid, in which a foot catches.
+    """Plan a walk along the worker's path in which a foot is caught.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
@@ -110,12 +110,12 @@ def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, worker: Worke
 
 @kernel
 def start_push(end_yaw: float, speed_m_s: float, prop: int, worker: Worker) -> float:
-    """Plan to push a cart or wheelbarrow along the path that is laid.
+    """Plan to push a cart or wheelbarrow along the worker's path.
 
     Args:
         end_yaw: heading at the end [rad].
         speed_m_s: top speed [m/s].
-        prop: the cart or wheelbarrow, an index into `PROPS`.
+        prop: kind of the cart or wheelbarrow, an index into `PROPS`.
         worker: record with the path; the plan is written into it.
 
     Returns:
@@ -131,7 +131,7 @@ def start_push(end_yaw: float, speed_m_s: float, prop: int, worker: Worker) -> f
 
 @kernel
 def _plan_handles(prop: int, worker: Worker) -> None:
-    """Plan the distance of the handles ahead, their height, and the lean of the trunk to them."""
+    """Plan the position of the handles, and the lean of the trunk towards them."""
     forward, aside, up = locate_shoulders(worker)
     across, high = worker.load_grip[1] - aside, worker.load_grip[2]
     if prop == WHEELBARROW:
@@ -147,7 +147,7 @@ def _plan_handles(prop: int, worker: Worker) -> None:
 
 @kernel
 def push(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector, but for the feet, of taking a handle, pushing and letting go.
+    """Write the control vector of grasping, pushing and releasing a cart, except for the feet.
 
     Args:
         t: time since the activity began [s].
@@ -167,19 +167,19 @@ def push(t: float, clock_s: float, worker: Worker) -> None:
     if worker.load_prop == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
         lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, worker)
-        tipped = STANDS_RAD * low - worker.tilt * (1.0 - low)  # back about its axle, handles down
+        tipped = STANDS_RAD * low - worker.tilt * (1.0 - low)  # about its axle, handles down
         ahead, up = _tilt_point(tipped, 0.0)
         shift(q, c.PROP_POSE, yaw, ahead, 0.0)
         q[c.PROP_POSE + 2] += up
         q[c.PROP_POSE + 4] -= tipped
     else:
         lean((CART_LEAN + stooped) * held, 0.0, 0.0, worker)
-    grip_load(held * (2.0 - held), worker)  # before the bent trunk takes them to the knees
+    grip_load(held * (2.0 - held), worker)  # before the bent trunk lowers them to the knees
 
 
 @kernel
 def _tilt_point(back_rad: float, z: float) -> SagittalShift:
-    """Return the displacement of a point at height z [m] when a wheelbarrow tilts back."""
+    """Return the displacement of a wheelbarrow's point at height z [m] when it tilts back."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)
     above = z - WHEEL_UP_M
     ahead = WHEEL_AHEAD_M * (1.0 - cos) - above * sin

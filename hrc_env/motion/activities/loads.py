@@ -1,7 +1,7 @@
-"""Loads: picked up and set down (the reverse), received from a person and handed over.
+"""Handling of loads: picking up and, in reverse, setting down; receiving and handing over.
 
-In recorded lifts the pelvis is 0.57 to 1.01 m high, and the wrists of the median trial move at no
-more than 1.3 m/s.
+In recorded lifts the pelvis is 0.57 to 1.01 m high, and in the median trial the wrists move at
+1.3 m/s at most.
 """
 
 import math
@@ -26,42 +26,45 @@ BOARD = PROP_NAMES.index("board")
 BOX_AHEAD_M = 0.37
 """Distance of a held box ahead of the root [m]; judgement."""
 BOX_HEIGHT = 1.10
-"""Height of a held box, in heights of the pelvis; judgement."""
+"""Height of a held box as a multiple of pelvis height; judgement."""
 BOARD_AHEAD_M = 0.27
 """Distance of a held board ahead of the root [m]; judgement."""
 BOARD_HEIGHT = 0.96
-"""Height of a held board, in heights of the pelvis; judgement."""
+"""Height of a held board as a multiple of pelvis height; judgement."""
 GIVEN_AHEAD_M = 0.60
-"""Distance of a load that is handed over ahead of the root [m]; judgement."""
+"""Distance ahead of the root of a load that is handed over [m]; judgement."""
 GIVEN_HEIGHT = 1.14
-"""Height of a load that is handed over, in heights of the pelvis; judgement."""
+"""Height of a load that is handed over, as a multiple of pelvis height; judgement."""
 CARRYING_SHARE = 0.95
-"""Greatest stretch of carrying arms; swinging trunks need the rest; judgement."""
+"""Greatest extension of carrying arms, as a share of their length; judgement.
+
+The rest is a reserve for the swinging trunk.
+"""
 ON_SHOULDER_M = (0.12, 0.165, 0.075)
-"""A board on the shoulder: ahead and to the side of the root, above the shoulder joint [m]."""
+"""Position of a board on the shoulder: ahead of and beside the root, above the shoulder [m]."""
 STEADY_M = 0.26
-"""Distance ahead of the root of the hand that steadies a board on the shoulder [m]; judgement."""
+"""Distance of the steadying hand from the middle of a board on the shoulder [m]; judgement."""
 NOSE_UP_RAD = 0.08
-"""Pitch of a board on the shoulder, its front end up [rad]; judgement."""
+"""Pitch of a board on the shoulder, with its front end up [rad]; judgement."""
 CROUCH_M = 0.15
-"""Height of a load that is gripped on the haunches [m]; judgement."""
+"""Height of a load that is gripped in a full squat [m]; judgement."""
 BENT_M = 0.45
-"""Height of a load that is gripped with a bent trunk [m]; judgement."""
+"""Height of a load that is gripped by bending the trunk only [m]; judgement."""
 GAZE_PAST_M = 0.35
-"""Distance past the load at which a worker on the haunches looks [m]; the head is over the load."""
+"""Distance beyond the load at which a squatting worker, with the head over it, looks [m]."""
 GRIP_S = 0.3
 """Time to grip a load [s]."""
 SHOULDER_S = 1.0
-"""Time to bring a load from before the body to the shoulder [s]."""
+"""Time to move a load from in front of the body to the shoulder [s]."""
 
 
 @kernel
 def pick_up(t: float, worker: Worker) -> None:
-    """Let a standing worker bend down to a load, grip it and come up with it.
+    """Add picking up to the pose of a standing worker: bend down, grip the load, raise it.
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q, yaw = worker.q, worker.start_yaw
     gripped = worker.out_at + worker.out_s
@@ -98,12 +101,12 @@ def plan_pick_up(
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the grips [m]; 0 to draw one.
-        prop: the load, an index into `PROPS`.
+        prop: kind of the load, an index into `PROPS`.
         on_shoulder: whether to carry a board on the shoulder.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
-        The time to raise the load by a metre [s].
+        The time in which the load is raised by a metre [s].
     """
     _plan_carrying(prop, on_shoulder and prop == BOARD, to.choose_hand(draws[0], worker), worker)
     z = height if height > 0.0 else scale_draw(draws[1], 0.18, 0.45)
@@ -113,15 +116,15 @@ def plan_pick_up(
 
 @kernel
 def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to take a box that another person holds out.
+    """Plan to receive a box that another person holds out.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
-        height: height of the box [m]; 0 for the usual one.
-        worker: record that the plan is written into.
+        height: height of the box [m]; 0 for the usual height.
+        worker: record into which the plan is written.
 
     Returns:
-        The time to raise the load by a metre [s].
+        The time in which the load is raised by a metre [s].
     """
     _plan_carrying(BOX, False, 1, worker)
     _plan_load_place(BOX, _find_handover_point(height, worker), worker)
@@ -136,10 +139,10 @@ def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the grips at rest [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
-        The time to raise the load by a metre [s].
+        The time in which the load is raised by a metre [s].
     """
     z = height if height > 0.0 else scale_draw(draws[1], 0.18, 0.45)
     _plan_load_place(worker.load_prop, Vector3(AWAY_M, 0.0, z), worker)
@@ -148,15 +151,15 @@ def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to hold out the load until another person has taken it.
+    """Plan to hold out the load until another person takes it.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
-        height: height of the load [m]; 0 for the usual one.
-        worker: record that the plan is written into.
+        height: height of the load [m]; 0 for the usual height.
+        worker: record into which the plan is written.
 
     Returns:
-        The time to raise the load by a metre [s].
+        The time in which the load is raised by a metre [s].
     """
     _plan_load_place(worker.load_prop, _find_handover_point(height, worker), worker)
     worker.is_hidden = True
@@ -165,20 +168,20 @@ def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def _find_handover_point(height: float, worker: Worker) -> Vector3:
-    """Return the point ahead of a worker where loads change hands: ahead, left, height [m]."""
+    """Return the position of a handover relative to the worker: ahead, left, height [m]."""
     usual = GIVEN_HEIGHT * worker.lengths[STAND_Z]
     return Vector3(GIVEN_AHEAD_M, 0.0, height if height > 0.0 else usual)
 
 
 @kernel
 def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> None:
-    """Plan how a load is carried.
+    """Plan the pose and grips of a carried load.
 
     Args:
-        prop: the load, an index into `PROPS`.
-        on_shoulder: whether it is carried on the shoulder.
-        side: side of that shoulder, 0 left, 1 right.
-        worker: record; its `load_...` fields are written.
+        prop: kind of the load, an index into `PROPS`.
+        on_shoulder: whether the load is carried on a shoulder.
+        side: side of the shoulder, 0 left, 1 right.
+        worker: record of the worker; its `load_...` fields are written.
     """
     at = worker.load_at
     take_load(prop, worker)
@@ -196,7 +199,7 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
     upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
     at[0], at[1] = ON_SHOULDER_M[0], (1.0 - 2.0 * side) * ON_SHOULDER_M[1]
     at[2] = worker.p[upper, 2] + ON_SHOULDER_M[2]
-    sign = 1.0 - 2.0 * side  # the end of the other hand comes to the front
+    sign = 1.0 - 2.0 * side  # the end at the other hand points forward
     at[3], at[5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
     worker.load_used[1 - side] = 0.0
     worker.load_grip[3 * side + 1] = -STEADY_M * sign
@@ -204,7 +207,7 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
 
 @kernel
 def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
-    """Plan where the load stands: ahead, to the left, height [m]."""
+    """Plan the position of a load at rest: ahead, to the left, height [m]."""
     to.clear_plan(worker)
     to.plan_tool(prop, 1, at, Vector3(0.0, 0.0, 0.0), worker)
     to.plan_gaze(at, worker)
@@ -212,7 +215,7 @@ def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
 
 @kernel
 def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
-    """Plan the pose (6,) in the world of the load when it is taken up or laid down."""
+    """Plan the pose (6,) in the world at which the load is picked up or laid down."""
     for i in range(6):
         worker.tool_pose[i] = pose_world[i]
     worker.tool_pose[3] = worker.start_yaw + wrap(pose_world[3] - worker.start_yaw)
@@ -222,11 +225,11 @@ def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, worker: Worker) -> float:
-    """Settle the trunk, the way and the times of a load.
+    """Complete the plan of a load: trunk, path and durations.
 
     Args:
-        raise_s: time to raise the load by a metre [s].
-        worker: record that the plan is written into.
+        raise_s: time in which the load is raised by a metre [s].
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

@@ -1,6 +1,6 @@
-"""Pieces of clips: from one moment on both feet to another, as long as there is room for.
+"""Pieces of clips that begin and end on both feet, and for which the scene has room.
 
-After a job a worker plays a piece on the spot, or goes to a place from which there is room
+After a job a worker plays a piece on the spot, or goes to a place with room for it
 (`setting_out.begin_clip`).
 """
 
@@ -26,31 +26,31 @@ LONGEST_S = 20.0
 SHORTEST_S = 0.5
 """Duration of the shortest piece [s]."""
 EDGE_SHARE = 0.15
-"""Share of a piece that each of its ends may lose, `SHORTEST_S` at most, to end on flat feet."""
+"""Share of a piece by which an end may be trimmed, up to `SHORTEST_S`, to end on flat feet."""
 LOW_M = 0.05
-"""Height of the higher foot up to which a piece may begin or end [m].
+"""Greatest height of the higher foot at the beginning and end of a piece [m].
 
-In a walk one foot rolls off behind while the other lands.
+In a walk one foot pushes off behind while the other lands.
 """
 UNLOADED_RAD = 0.5
-"""Tilt of the feet that standing on both of them outweighs [rad]."""
+"""Penalty, in tilt of the feet, for beginning or ending a piece without both feet loaded [rad]."""
 TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
-"""Headings from the worker's own that are tried for a clip; two steps turn no further [rad]."""
+"""Headings of a clip relative to the worker's that are tried, limited to two steps' turn [rad]."""
 SPARE_M = 0.05
-"""Reserve of the room for a piece, as workers stand a little beside their places [m]."""
+"""Reserve in the room for a piece, because workers stand slightly off their places [m]."""
 ENOUGH = 0.1
-"""Share of the places from which a piece has room, if there is such a piece."""
+"""Share of the places at which a piece should have room, if possible."""
 ROBOT_RADII = np.linspace(0.0, 1.0, 3)
-"""Places at the robot that are tried: shares of the range of the radius."""
+"""Candidate places at the robot: shares of the range of the radius."""
 ROBOT_AZIMUTHS = np.linspace(-1.0, 1.0, 7)
-"""Places at the robot that are tried: shares of the range of the azimuth."""
+"""Candidate places at the robot: shares of the range of the azimuth."""
 
 
 class NoRoomError(ConfigError):
     """A clip does not fit on the floor."""
 
     def __init__(self, clip: Clip) -> None:
-        """Name the clip in the message."""
+        """Create an error that names the clip."""
         super().__init__(
             f"{clip.source}: there is no room for {SHORTEST_S} s or more of this clip from any "
             "place where workers finish a job."
@@ -60,32 +60,32 @@ class NoRoomError(ConfigError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """Where clips are played."""
+    """Floor and starting poses for clips."""
 
     plan: Floorplan
-    """Free floor of the scene."""
+    """Floor of the scene."""
     starts: Floats
     """Poses (S, 3) of workers after a job: x, y [m], heading [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clips:
-    """Pieces of clips, one after the other."""
+    """Concatenated pieces of clips."""
 
     frames: Floats
-    """Frames (n_bodies N, 32) of all pieces for each body, from the origin towards +x."""
+    """Frames (n_bodies N, 32) of all pieces for each body; they begin at the origin, facing +x."""
     row: Ints
-    """First row of each piece (n,), of the first body."""
+    """First row (n,) of each piece, for the first body."""
     count: Ints
-    """Number of rows of each piece (n,)."""
+    """Number of rows (n,) of each piece."""
     fps: Floats
-    """Frame rate of each piece (n,) [Hz]."""
+    """Frame rate (n,) of each piece [Hz]."""
     starts: tuple[Floats, ...]
-    """For each piece the poses (k, 3) from which there is room for it: x, y [m], heading [rad]."""
+    """Poses (k, 3) at which there is room for each piece: x, y [m], heading [rad]."""
 
     @property
     def n_rows(self) -> int:
-        """Number of frames N of all pieces of one body."""
+        """Number of frames N of all pieces for one body."""
         return int(self.count.sum())
 
     @property
@@ -95,18 +95,18 @@ class Clips:
 
 
 class _Piece(NamedTuple):
-    """Part of a clip."""
+    """A part of a clip."""
 
     first: int
     """First frame."""
     last: int
     """Last frame."""
     starts: Floats
-    """Poses (k, 3) as in `Clips`."""
+    """Poses (k, 3) as in `Clips.starts`."""
 
 
 def make_stage(plan: Floorplan, config: MotionConfig) -> Stage:
-    """Return the places from which workers with these settings play clips."""
+    """Return the poses at which workers with these settings begin clips."""
     kinds = {job.at for job in config.jobs} - {"robot"}
     places = [(*p.xy_m, p.yaw_rad) for p in plan.grounds.places if p.kind in kinds]
     low, high = config.near_radius_m
@@ -123,14 +123,14 @@ def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
 
     Args:
         clips: recorded motion.
-        lengths: lengths (n_bodies, N_SIZES) of the bodies [m], see `Anatomy.lengths`.
-        stage: where they are played.
+        lengths: dimensions (n_bodies, N_SIZES) of the bodies [m], see `Anatomy.lengths`.
+        stage: floor and starting poses.
 
     Returns:
         The pieces, scaled to each body.
 
     Raises:
-        NoRoomError: no part of a clip fits where it is to be played.
+        NoRoomError: no part of a clip fits at any of the starting poses.
         ConfigError: a clip has no two moments with both feet on the floor.
     """
     bodies = [[scale_clip(clip, row) for row in lengths] for clip in clips]
@@ -155,13 +155,13 @@ def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
 def _cut_clip(clip: Clip, bodies: list[Floats], stage: Stage) -> list[_Piece]:
     """Return the pieces of one clip.
 
-    At both ends of a piece the feet are low; they stand, and are flat, if they do so at about that
-    time.
+    At both ends of a piece the feet are low. They are also loaded and flat, if the clip has such a
+    frame at about that time.
 
     Args:
         clip: recorded motion.
-        bodies: its control vectors scaled to each body.
-        stage: where it is played.
+        bodies: control vectors of the clip, scaled to each body.
+        stage: floor and starting poses.
     """
     tilt = np.abs(clip.controls[:, [c.ANKLE + 4, c.ANKLE + 10]]).sum(1)
     tilt += UNLOADED_RAD * ~clip.contacts.all(1)
@@ -189,12 +189,12 @@ def _cut_clip(clip: Clip, bodies: list[Floats], stage: Stage) -> list[_Piece]:
 
 
 def _count_edge_frames(n_frames: int, fewest: float) -> float:
-    """Return the number of frames at an end of a piece among which the flattest feet are chosen."""
+    """Return the number of frames at an end of a piece from which the flattest feet are chosen."""
     return min(fewest, EDGE_SHARE * n_frames, max(0.0, 0.5 * (n_frames - fewest)))
 
 
 def _find_stands(clip: Clip) -> Ints:
-    """Return the frames in which both feet are low: at least two, far enough apart for a piece."""
+    """Return the frames with both feet low; raise `ConfigError` if they do not span a piece."""
     feet = [find_footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size) for side in range(2)]
     low = (np.stack(feet, 1)[..., 2] - clip.size[ANKLE_Z]).max(1) < LOW_M
     stands = np.flatnonzero(low)
@@ -208,15 +208,15 @@ def _find_stands(clip: Clip) -> Ints:
 
 
 def _count_room(q: Floats, stage: Stage) -> Ints:
-    """Return for each start (S,) the number of frames of control vectors that there is room for."""
+    """Return the number of frames (S,) of control vectors for which each start has room."""
     way = np.ascontiguousarray(move_to_origin(q)[:, [c.ROOT_X, c.ROOT_Y]])
     return _measure_room(way, stage.starts, stage.plan.grid)
 
 
 def _choose_room(room: Ints, least: int) -> int:
-    """Return the number of frames with room from a share `ENOUGH` of the places.
+    """Return the number of frames for which a share `ENOUGH` of the places has room.
 
-    If that is not more than `least`, return the number with room from the best place.
+    If it is not more than `least`, return the number of frames at the best place.
     """
     room = np.sort(room)
     usual = int(room[-max(1, round(ENOUGH * len(room)))])
@@ -225,12 +225,12 @@ def _choose_room(room: Ints, least: int) -> int:
 
 @kernel(makes_arrays=True)
 def _measure_room(way: Floats, starts: Floats, grid: FloorGrid) -> Ints:
-    """Return the number of points of a way that have room before the first that has none.
+    """Return the number of leading points of a path that have room, for the best of `TURNS_RAD`.
 
     Args:
-        way: points (N, 2) from the origin on [m].
-        starts: poses (S, 3) from which the way begins, in the best of `TURNS_RAD`.
-        grid: free distance on the floor.
+        way: points (N, 2) of the path, which begins at the origin [m].
+        starts: poses (S, 3) at which the path begins.
+        grid: slack on the floor.
 
     Returns:
         The number of points from each start (S,).
@@ -251,10 +251,10 @@ def _measure_room(way: Floats, starts: Floats, grid: FloorGrid) -> Ints:
 
 
 def find_piece(clips: Clips, worker: Worker) -> int:
-    """Return the piece that a worker plays or goes to play."""
+    """Return the index of the piece that a worker plays or is about to play."""
     return int(np.searchsorted(clips.row, worker.clip_row % clips.n_rows))
 
 
 def find_next_piece(clips: Clips, worker: Worker) -> int:
-    """Return the piece after the one that was played; the first follows the last."""
+    """Return the index of the next piece after the worker's; the first piece follows the last."""
     return (find_piece(clips, worker) + 1) % len(clips.row)

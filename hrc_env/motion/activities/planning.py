@@ -1,4 +1,4 @@
-"""Plans of work in place: where tool and hands go, how far the trunk leans, and for how long."""
+"""Plans of work in place: poses of tool and hands, lean of the trunk, and durations."""
 
 import math
 
@@ -26,27 +26,27 @@ TAKE_S = 0.55
 STEP_S = 0.9
 """Time to step into a stance [s]; judgement."""
 KNEEL_S = 1.5
-"""Time to get down on a knee [s]; judgement."""
+"""Time to kneel down on one knee [s]; judgement."""
 CROUCH_S = 1.1
-"""Time to get down on the haunches [s]; judgement."""
+"""Time to squat down [s]; judgement."""
 KNEEL_STEP_AT_S = 0.15
-"""Time of the first lift-off on the way onto a knee [s]."""
+"""Time of the first lift-off in kneeling down [s]."""
 KNEEL_PERIOD_S = 0.62
-"""Period of the steps onto a knee [s]; they are slow, or the knee would jerk."""
+"""Period of the steps in kneeling down [s]; the steps are slow to avoid jerks of the knee."""
 KNEEL_SWING_S = 0.60
-"""Time that a foot is in the air on the way onto a knee [s]."""
+"""Swing time of a foot in kneeling down [s]."""
 CALM_M_S = 1.1
-"""Peak speed of hands that go to their work [m/s]; calm manual work."""
+"""Peak speed of hands on their way to the work [m/s]; typical of calm manual work."""
 KNEE_ASIDE_M = 0.17
-"""Distance of kneeling hands to the side of the other leg [m]."""
+"""Lateral offset of a kneeling worker's hands, towards the lowered knee [m]."""
 SPARE_M = 0.03
-"""Reserve of the reach of the arms [m], because bodies sway."""
+"""Reserve in the reach of the arms, because bodies sway [m]."""
 SLUMP_M = 0.01
-"""Distance by which the shoulders of a standing trunk are forward [m]."""
+"""Forward displacement of the shoulders when standing [m]."""
 TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
-"""Segments from the pelvis to the shoulder, each the child of the one before."""
+"""Segments from the pelvis to the left shoulder, each the child of the one before."""
 FAR = 1e3
-"""Time at which every step is done [s]."""
+"""Time after the end of all steps [s]."""
 
 
 @kernel
@@ -57,13 +57,13 @@ def scale_draw(draw: float, low: float, high: float) -> float:
 
 @kernel
 def choose_hand(draw: float, worker: Worker) -> int:
-    """Return the hand that holds the tool, 0 left or 1 right, by a draw in [0, 1)."""
+    """Choose the hand for the tool, 0 left or 1 right, by a draw in [0, 1)."""
     return 1 if draw < 0.5 + (worker.right_handed - 0.5) * 1.25 else 0
 
 
 @kernel
 def clear_plan(worker: Worker) -> None:
-    """Clear the plan: no steps and no work; a load that is carried stays."""
+    """Clear the plan of steps and work; a carried load remains."""
     worker.lean = worker.twist = worker.squat = worker.kneel = worker.crouch = worker.ahead = 0.0
     worker.hold_s = worker.take_s = worker.wander_m = worker.down_m = worker.stroke_m = (
         worker.stroke_hz
@@ -78,14 +78,14 @@ def clear_plan(worker: Worker) -> None:
 
 @kernel
 def begin_plan(draw: float, worker: Worker) -> int:
-    """Clear the plan, and return the tool's hand, 0 left or 1 right, by a draw in [0, 1)."""
+    """Clear the plan, and choose the hand for the tool, 0 left or 1 right, by a draw in [0, 1)."""
     clear_plan(worker)
     return choose_hand(draw, worker)
 
 
 @kernel
 def plan_kneeling(side: int, worker: Worker) -> None:
-    """Plan to kneel on the knee of a side, 0 left or 1 right."""
+    """Plan to kneel on one knee, 0 left or 1 right."""
     leg = worker.lengths[an.LEG]
     worker.kneel, worker.ahead = 1.0, -0.08
     worker.settle_s, worker.out_at = KNEEL_S, 0.4
@@ -96,30 +96,30 @@ def plan_kneeling(side: int, worker: Worker) -> None:
 
 @kernel
 def offset_before_knee(worker: Worker) -> float:
-    """Return the offset to the left at which the hands of a kneeling worker work [m].
+    """Return the offset of a kneeling worker's hands to the left [m].
 
-    They work before the knee that is down; the offset is 0 for all others.
+    They work in front of the lowered knee; the offset is 0 if the worker does not kneel.
     """
     return KNEE_ASIDE_M * (1.0 - 2.0 * worker.step_first) if worker.kneel > 0.0 else 0.0
 
 
 @kernel
 def plan_step_ahead(side: int, ahead: float, worker: Worker) -> None:
-    """Plan to work with the foot of a side (0 left, 1 right) a distance ahead [m]."""
+    """Plan to work with one foot, 0 left or 1 right, a distance [m] ahead."""
     step_into(side, ahead, 0.0, 0.02, worker)
     worker.ahead, worker.settle_s = 0.45 * ahead, STEP_S
 
 
 @kernel
 def plan_stance(z: float, knee: int, foot: int, ahead: float, worker: Worker) -> float:
-    """Plan to kneel for low work, else to step ahead.
+    """Plan to kneel for low work, and to step ahead for other work.
 
     Args:
         z: height of the work [m].
-        knee: side of the knee that goes down, 0 left, 1 right.
-        foot: side of the foot that steps ahead.
+        knee: side of the knee that is lowered, 0 left, 1 right.
+        foot: side of the foot that steps ahead, 0 left, 1 right.
         ahead: length of the step [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The offset of the hands to the left [m].
@@ -133,7 +133,7 @@ def plan_stance(z: float, knee: int, foot: int, ahead: float, worker: Worker) ->
 
 @kernel
 def locate_shoulders(worker: Worker) -> Vector3:
-    """Return a standing worker's shoulder joint: ahead of the root, to a side, height [m]."""
+    """Return a standing worker's left shoulder joint: ahead and left of the root, height [m]."""
     bones = worker.bones
     ahead, aside, up = SLUMP_M, 0.0, worker.lengths[an.STAND_Z]
     for segment in TO_SHOULDER:
@@ -145,13 +145,13 @@ def locate_shoulders(worker: Worker) -> Vector3:
 
 @kernel
 def measure_reach(share: float, one: float, other: float, worker: Worker) -> float:
-    """Return the reach of an arm along an axis [m].
+    """Return the reach of an arm along an axis, given the other coordinates of the target [m].
 
     Args:
         share: share of the arm's length that is used.
         one: distance of the target along the second axis [m].
         other: distance of the target along the third axis [m].
-        worker: record with the lengths of the body.
+        worker: record with the body dimensions.
     """
     reach = share * worker.lengths[an.ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
@@ -162,11 +162,11 @@ def plan_tool(tool: int, side: int, at: Vector3, turn: Vector3, worker: Worker) 
     """Plan the pose of the tool at work.
 
     Args:
-        tool: the prop, an index into `PROPS`; 0 for empty hands.
-        side: hand that holds it, 0 left, 1 right.
-        at: position ahead, to the left, and height [m].
-        turn: yaw from the heading, pitch and roll [rad].
-        worker: record that the plan is written into.
+        tool: kind of the tool, an index into `PROPS`; 0 for empty hands.
+        side: hand that holds the tool, 0 left, 1 right.
+        at: position of the tool: ahead, to the left, height [m].
+        turn: orientation of the tool: yaw from the heading, pitch, roll [rad].
+        worker: record into which the plan is written.
     """
     worker.tool, worker.side = tool, side
     worker.take_s = TAKE_S if tool > 0 else 0.0
@@ -179,7 +179,7 @@ def plan_tool(tool: int, side: int, at: Vector3, turn: Vector3, worker: Worker) 
 
 @kernel
 def plan_other_hand(at: Vector3, worker: Worker) -> None:
-    """Plan where the other hand works: ahead, to the left, height [m]."""
+    """Plan the target of the hand without the tool: ahead, to the left, height [m]."""
     other = 1 - worker.side
     target = worker.target[3 * other :]
     target[0], target[1], target[2] = locate_ahead(at.x, at.y, at.z, worker)
@@ -188,7 +188,7 @@ def plan_other_hand(at: Vector3, worker: Worker) -> None:
 
 @kernel
 def plan_gaze(at: Vector3, worker: Worker) -> None:
-    """Plan the point that the worker looks at: ahead, to the left, height [m]."""
+    """Plan the point at which the worker looks: ahead, to the left, height [m]."""
     worker.gaze[0], worker.gaze[1], worker.gaze[2] = locate_ahead(at.x, at.y, at.z, worker)
 
 
@@ -201,10 +201,10 @@ def plan_strokes(
     Args:
         kind: kind of stroke, see `strokes`.
         size_m: size of a stroke [m].
-        rate_hz: rate of the strokes [Hz].
+        rate_hz: frequency of the strokes [Hz].
         burst_s: duration of a burst [s].
         n: number of bursts.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
     """
     worker.stroke, worker.stroke_m, worker.stroke_hz = kind, size_m, rate_hz
     worker.burst_s, worker.hold_s = burst_s, n * (burst_s + PAUSE_S)
@@ -222,13 +222,13 @@ def pose_at_work(worker: Worker) -> None:
 
 @kernel
 def finish_plan(peak_m_s: float, worker: Worker) -> float:
-    """Plan trunk and times of work, after its hands, strokes and steps.
+    """Complete the plan of work: trunk and durations, given its hands, strokes and steps.
 
-    No plan function calls this kernel, or each would be compiled with all of it once more.
+    Plan functions do not call this kernel, because it would then be compiled again in each of them.
 
     Args:
-        peak_m_s: peak speed of hands that go to the work [m/s].
-        worker: record that the plan is written into.
+        peak_m_s: peak speed of the hands on their way to the work [m/s].
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -248,7 +248,7 @@ def finish_plan(peak_m_s: float, worker: Worker) -> float:
 
 @kernel
 def find_lean(worker: Worker) -> None:
-    """Find the smallest lean that brings the work within reach; else move the work nearer."""
+    """Find the smallest lean that brings the work within reach, or move the work nearer."""
     low, high, worker.lean = 0.0, MOST_LEAN, 0.0
     upright = _measure_shortfall(worker)
     if upright <= 0.0:
@@ -287,7 +287,7 @@ def _move_nearer(far: float, worker: Worker) -> None:
 
 @kernel
 def _measure_hand_way(worker: Worker) -> float:
-    """Return the longest way of a hand from hanging, or from the belt, to its work [m]."""
+    """Return the longest distance of a hand from its initial position to its work [m]."""
     pose_at_work(worker)
     used, goal = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1]), worker.goals
     for i in range(6):

@@ -1,4 +1,4 @@
-"""Playing a clip: two steps into its first pose, the recording, two steps out of its last pose.
+"""Playing a clip: two steps into its first pose, the recording, and two steps to a stance.
 
 A frame holds the columns `clip.RECORDED` of a piece (`pieces.Clips`).
 """
@@ -21,21 +21,21 @@ from hrc_env.motion.state import N_ROOTS, Worker
 from hrc_env.motion.walk import write_footprint
 
 STEP_AT_S = 0.12
-"""Time of the first lift-off of the steps into a clip [s]."""
+"""Time of the first lift-off before a clip [s]."""
 PERIOD_S = 0.50
-"""Period of the steps into a clip and out of it [s]."""
+"""Period of the steps before and after a clip [s]."""
 SWING_S = 0.42
-"""Time that a foot is in the air in the steps into a clip and out of it [s]."""
+"""Swing time of the steps before and after a clip [s]."""
 TILT_S = 0.25
-"""Time in which standing feet take their pitch in the clip [s]."""
+"""Time in which standing feet reach their pitch in the clip [s]."""
 PACE_S = 0.6
-"""Time in which the recording gathers its pace, and again loses it [s]."""
+"""Time in which the recording accelerates to its normal rate, and decelerates from it [s]."""
 SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
-"""Time of the steps and the change of pitch together [s]."""
+"""Total time of the two steps and the change of pitch [s]."""
 END, BEGIN, LAST = 0, 2, 4
-"""First of two footprints where the activity ends, where the clip begins, and where it ends."""
+"""First of two footprints at the activity's end, the clip's beginning, and the clip's end."""
 STRIDE_SHARE = 0.25
-"""Length of the steps into a clip and out of it as a share of a full stride."""
+"""Length of the steps before and after a clip as a share of a full stride."""
 
 
 def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> float:
@@ -43,9 +43,9 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
 
     Args:
         piece: index of the piece.
-        turn_rad: heading of the clip from the worker's own [rad].
-        clips: all pieces.
-        worker: record that the plan is written into.
+        turn_rad: heading of the clip relative to the worker's heading [rad].
+        clips: pieces of all clips.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -81,14 +81,14 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
 
 @kernel
 def _to_clip_time(since: float, worker: Worker) -> float:
-    """Return the time in the recording `since` [s] after its slow beginning [s]."""
+    """Convert the time [s] since playback began to the time in the recording [s]."""
     slow = worker.clip_s - PACE_S
     return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 
 
 @kernel
 def play(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
-    """Write the control vector, feet included, of playing a clip.
+    """Write the control vector of playing a clip, including the feet.
 
     Args:
         t: time since the activity began [s].
@@ -124,13 +124,13 @@ def play(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def _interpolate_frames(f: float, column: int, frames: Floats, worker: Worker) -> float:
-    """Return a column between frames by a Catmull-Rom spline, held at the ends.
+    """Interpolate a column between frames by a Catmull-Rom spline, clamped at the ends.
 
     Args:
         f: time in frames of the clip.
         column: column of the frames.
         frames: frames of all clips.
-        worker: record that says which frames are the clip's.
+        worker: record with the range of the clip's frames.
     """
     first, last = worker.clip_row, worker.clip_row + worker.clip_frames - 1
     k = first + int(f)
@@ -143,13 +143,13 @@ def _interpolate_frames(f: float, column: int, frames: Floats, worker: Worker) -
 
 @kernel
 def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
-    """Change root, trunk, head and arms of a standing worker by a share into those of the clip.
+    """Blend root, trunk, head and arms of a standing worker with those of the clip.
 
     Args:
         f: time in frames of the clip.
-        share: share of the clip.
+        share: weight of the clip.
         frames: frames of all clips.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     ahead, left = (
@@ -167,13 +167,13 @@ def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
-    """Write the foot of the clip, where the clip is placed.
+    """Write the pose of a foot in the clip, transformed to the world.
 
     Args:
         f: time in frames of the clip.
         side: 0 left, 1 right.
         frames: frames of all clips.
-        worker: record; its `q` is written.
+        worker: record of the worker; its `q` is written.
     """
     q, at, column = worker.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
     ahead, left = (
@@ -188,7 +188,7 @@ def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def predict_clip_root(t: float, worker: Worker) -> Point:
-    """Return the approximate root on the floor at time t of a clip, and after it."""
+    """Predict the approximate root on the floor at time t of a clip, also after its end."""
     duration_s = worker.clip_s + 2.0 * SETTLE_S
     u = min(max(t / duration_s, 0.0), 1.0) * (N_ROOTS - 1)
     k = min(int(u), N_ROOTS - 2)

@@ -1,7 +1,7 @@
-"""Running: short contacts and flights between them, bent arms, a lean with every change of speed.
+"""Running: short contacts with flights between, bent arms, and a lean that follows acceleration.
 
-Steps are those of `walk.plan_steps` with a longer time in the air. Cadence and contact at 2.5 to
-3.5 m/s: about 165 to 175 steps a minute and 0.25 s (Cavanagh & Kram 1989,
+Steps are planned by `walk.plan_steps`, with a longer swing. At 2.5 to 3.5 m/s, the cadence is about
+165 to 175 steps/min and the contact time 0.25 s (Cavanagh & Kram 1989,
 doi:10.1249/00005768-198908000-00020).
 """
 
@@ -20,51 +20,48 @@ STEP_S = 0.355
 STEP_FASTER_S = 0.03
 """Decrease of the period for each m/s above `USUAL_M_S` [s]."""
 USUAL_M_S = 3.0
-"""Speed at which the periods above and below hold [m/s]."""
+"""Speed at which `STEP_S` and `ALOFT_SHARE` hold [m/s]."""
 ALOFT_SHARE = 1.46
-"""Time in the air at `USUAL_M_S`, in periods of a step.
+"""Swing time at `USUAL_M_S`, in periods of a step.
 
-A foot leaves slowly, so this is about 0.06 s more than the time between two contacts.
+It is about 0.06 s more than the time between two contacts, because a foot lifts off slowly.
 """
 ALOFT_FAST = 0.08
 """Increase of `ALOFT_SHARE` for each m/s above `USUAL_M_S`."""
 RUN_M_S2 = 3.0
-"""Mean rate of gathering speed, and of losing it [m/s^2]; judgement."""
+"""Mean acceleration at the beginning, and deceleration at the end [m/s^2]; judgement."""
 CORNER_M_S2 = 2.5
-"""Greatest sideways acceleration in corners [m/s^2]; judgement."""
+"""Greatest lateral acceleration in corners [m/s^2]; judgement."""
 BRAKED_M = 0.3
-"""Length of a path beyond that for gathering and losing speed [m]; judgement."""
+"""Path length in addition to that for acceleration and deceleration [m]; judgement."""
 BOB_M = 0.036
-"""Half the rise and fall of the pelvis [m]; 7 to 9 cm in all are measured."""
+"""Amplitude of the pelvis's vertical motion [m]; measured: 7 to 9 cm peak to peak."""
 LOWER_M = 0.085
-"""Depth of the pelvis below standing [m]."""
+"""Lowering of the pelvis from its standing height [m]."""
 LEAN_RAD = 0.12
-"""Lean at a steady run [rad]."""
+"""Lean of the trunk at constant speed [rad]."""
 LEAN_G = 0.75
-"""Lean for an acceleration of 9.81 m/s^2 [rad]."""
+"""Additional lean of the trunk at an acceleration of 9.81 m/s^2 [rad]."""
 ARM_RAD = 0.52
-"""Swing of the upper arm to each side [rad]."""
+"""Amplitude of the upper arm's swing [rad]."""
 ELBOW_RAD = 1.45
 """Bend of the elbow [rad]."""
 ELBOW_SWING = 0.35
-"""Share of the arm swing by which the elbow bends."""
+"""Additional bend of the elbow as a share of the arm swing."""
 NECK = 0.7
-"""Share of the lean that the neck takes back."""
+"""Share of the lean that the neck compensates."""
 
 
 @kernel
 def limit_run_speed(wanted_m_s: float, worker: Worker) -> float:
-    """Return the greatest speed up to the wanted one at which the laid path can be run [m/s].
-
-    A path may be too short or too sharply bent.
-    """
+    """Return the desired speed, limited by length and curvature of the worker's path [m/s]."""
     straight = math.sqrt(RUN_M_S2 * max(worker.length - BRAKED_M, 0.0))
     return min(wanted_m_s, straight, math.sqrt(CORNER_M_S2 / max(worker.sharpest, 1e-6)))
 
 
 @kernel
 def plan_run(end_yaw: float, speed_m_s: float, worker: Worker) -> float:
-    """Plan to run along the path that is laid.
+    """Plan to run along the worker's path.
 
     Args:
         end_yaw: heading at the end [rad].
@@ -86,7 +83,7 @@ def plan_run(end_yaw: float, speed_m_s: float, worker: Worker) -> float:
 
 @kernel
 def run(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of a runner, but for the feet.
+    """Write the control vector of a runner, except for the feet.
 
     Args:
         t: time since the run began [s].

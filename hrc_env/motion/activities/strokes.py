@@ -1,4 +1,4 @@
-"""Movements of hands and tools at work: strokes in bursts, moving along the work in between."""
+"""Movements of hands and tools at work: bursts of strokes, and moves along the work."""
 
 import math
 from typing import NamedTuple
@@ -12,24 +12,24 @@ from hrc_env.motion.state import Worker
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
 """Kinds of strokes.
 
-None; a hammer's blows; drilling while the other hand fetches screws; drilling; sawing; none but
-moving along; small movements of both hands; a beat of a pointing hand.
+They are: none; blows of a hammer; drilling while the other hand fetches screws; drilling; sawing;
+only moving along the work; small movements of both hands; beats of a pointing hand.
 """
 PAUSE_S = 0.7
 """Time between two bursts [s]."""
 EASE_S = 0.25
-"""Time in which strokes begin, and end [s]."""
+"""Time in which strokes fade in and out [s]."""
 FETCH_S = 0.55
-"""Time from a screw's place to the pouch [s]."""
+"""Time in which the hand moves from the work to the pouch [s]."""
 
 
 class ScrewProgress(NamedTuple):
     """Progress of driving screws."""
 
     n_done: int
-    """Number of screws that are driven."""
+    """Number of screws that have been driven."""
     is_driving: bool
-    """Whether one is being driven."""
+    """Whether a screw is being driven."""
 
 
 @kernel
@@ -37,7 +37,7 @@ def apply_stroke(t: float, worker: Worker) -> None:
     """Add the stroke to the tool's pose in `q`, and write the other hand's offset from its target.
 
     Args:
-        t: time since the hands arrived at the work [s], 0 to `hold_s`.
+        t: time since the hands arrived at the work [s], from 0 to `hold_s`.
         worker: record with the plan; its `q` is changed.
     """
     q = worker.q
@@ -68,13 +68,13 @@ def apply_stroke(t: float, worker: Worker) -> None:
 
 @kernel
 def _wander(n: int, u: float, other: int, worker: Worker) -> None:
-    """Move to and fro along the work, or down, by one place a burst.
+    """Move back and forth along the work, or down, by one position per burst.
 
     Args:
         n: index of the burst.
         u: time since the burst began [s].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     on = min_jerk((u - worker.burst_s) / PAUSE_S)
@@ -91,7 +91,7 @@ def _wander(n: int, u: float, other: int, worker: Worker) -> None:
 
 @kernel
 def count_screws(worker: Worker) -> ScrewProgress:
-    """Return the number of finished bursts, and whether one is going on."""
+    """Return the number of screws that have been driven, and whether one is being driven."""
     t = worker.time_s - worker.out_at - worker.take_s - worker.out_s
     cycle = worker.burst_s + PAUSE_S
     if t <= 0.0:
@@ -117,12 +117,12 @@ def _advance_tool(way: float, worker: Worker) -> None:
 
 @kernel
 def _strike(ease: float, turn: float, worker: Worker) -> None:
-    """Swing the hammer back slowly and forward faster, about the wrist and with the arm.
+    """Swing the hammer slowly back and faster forward, by wrist and arm.
 
     Args:
-        ease: share of the stroke.
+        ease: weight of the stroke.
         turn: phase of the stroke [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, size = worker.q, worker.stroke_m
     skew = min(1.5 * size, 0.35)
@@ -136,12 +136,12 @@ def _strike(ease: float, turn: float, worker: Worker) -> None:
 
 @kernel
 def _fetch(u: float, other: int, worker: Worker) -> None:
-    """Take the other hand to the belt for the next screw, and back.
+    """Move the other hand to the belt for the next screw, and back.
 
     Args:
         u: time since the burst began [s].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     late = u - worker.burst_s + 0.05 + FETCH_S
@@ -161,10 +161,10 @@ def _fidget(ease: float, turn: float, other: int, worker: Worker) -> None:
     """Add small movements of both hands, or of a pointing hand alone.
 
     Args:
-        ease: share of the movement.
+        ease: weight of the movement.
         turn: phase of the movement [rad].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, size = worker.q, ease * worker.stroke_m
     if worker.stroke == JAB:

@@ -1,4 +1,4 @@
-"""Work in place: get down to it, take a tool from the belt, work, and all of it backwards."""
+"""Work in place: lower the body, take a tool from the belt, work, and do the same in reverse."""
 
 import math
 
@@ -12,61 +12,65 @@ from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
 from hrc_env.motion.posture import lean, locate_from_root, look_at
 from hrc_env.motion.state import Worker
 
+_X, _Y, _STRIDE_SHARE = 0, 1, 3
+"""Columns of a footprint: world x and y [m], and share of a full stride."""
+_SHORT_STEP_SHARE = 0.3
+"""Share of a full stride of the steps that widen a stance; judgement."""
 GAZE_LEAD_S = 0.25
-"""Time by which eyes and head precede the hand [s] (Land & Hayhoe 2001: up to half a second)."""
+"""Lead of eyes and head over the hand [s] (Land & Hayhoe 2001: up to half a second)."""
 BELT_AHEAD_M = 0.10
-"""Distance of a hanging tool ahead of the pelvis [m]; judgement."""
+"""Distance of a tool on the belt ahead of the pelvis [m]; judgement."""
 BELT_SIDE_M = 0.29
-"""Distance of a hanging tool to the side of the pelvis [m]; judgement."""
+"""Lateral distance of a tool on the belt from the pelvis [m]; judgement."""
 BELT_UP_M = 0.06
-"""Height of a hanging tool above the pelvis [m]; judgement."""
+"""Height of a tool on the belt above the pelvis [m]; judgement."""
 BELT_PITCH_RAD = 1.3
-"""Pitch of a hanging tool [rad]; judgement."""
+"""Pitch of a tool on the belt [rad]; judgement."""
 BELLY_AHEAD_M = 0.34
-"""Distance ahead of the pelvis at which the other hand passes on its way to the floor [m]."""
+"""Distance ahead of the pelvis at which the other hand passes on the way to the floor [m]."""
 BELLY_SIDE_M = 0.06
-"""Distance to the side at which the other hand passes on its way to the floor [m]."""
+"""Lateral distance from the pelvis at which the other hand passes on the way to the floor [m]."""
 BELLY_UP_M = 0.22
-"""Height above the pelvis at which the other hand passes on its way to the floor [m]."""
+"""Height above the pelvis at which the other hand passes on the way to the floor [m]."""
 EARLY_SHARE = 0.55
-"""Share of the time to get down in which hands precede the body; judgement."""
+"""Share of the time to lower the body after which the hands have arrived; judgement."""
 JOIN_AT = 0.3
-"""Share of the way at which a second hand comes to a tool; judgement."""
+"""Share of the way at which a second hand joins a tool; judgement."""
 DRAWN_SHARE = 0.6
-"""Share of the way at which a tape that both hands draw is out; judgement."""
+"""Share of the time to reach out after which a two-handed tape is drawn; judgement."""
 ELBOWS_RAD = 0.25
 """Outward turn of the elbows at work [rad]; judgement."""
 LOW_ELBOWS_RAD = 0.4
 """Outward turn of the elbows at floor height [rad]; judgement."""
 RISE = 0.5
-"""Forward bulge of the way of a hand to high work, as a share of the height."""
+"""Forward bulge of a hand's path to high work, as a share of the work's height."""
 OVER_KNEE_M = 0.22
-"""Bulge of the way of a hand over the knees to low work [m]."""
+"""Bulge of a hand's path over the knees to low work [m]."""
 LOW_M = 0.6
-"""Height below which work is low [m]."""
+"""Height below which work counts as low [m]."""
 KNEE_M = 0.055
-"""Height of the joint of a kneeling knee [m]."""
+"""Height of the knee joint in kneeling [m]."""
 HAUNCH_SHARE = 0.46
-"""Height of the pelvis on the haunches as a share of its height when standing."""
+"""Height of the pelvis in a full squat as a share of its height when standing."""
 KNEEL_HEEL_RAD = 1.2
-"""Pitch of a kneeling foot, the heel up [rad]; judgement."""
+"""Pitch of the rear foot in kneeling, with the heel up [rad]; judgement."""
 HAUNCH_HEEL_RAD = 0.55
-"""Pitch of both feet on the haunches, the heels up [rad]; judgement."""
+"""Pitch of both feet in a full squat, with the heels up [rad]; judgement."""
 FRONT_LEG = 0.38
-"""Distance of the front foot of a kneeling worker ahead of its stance, in lengths of the leg."""
+"""Forward step of a kneeling worker's front foot from its stance, in leg lengths."""
 REAR_LEG = -0.72
-"""Distance of the rear foot of a kneeling worker ahead of its stance, in lengths of the leg."""
+"""Forward step of a kneeling worker's rear foot from its stance, in leg lengths."""
 STEP_AT_S = 0.08
 """Time of the first step that widens a stance [s]."""
 STEP_PERIOD_S = 0.42
 """Period of the steps that widen a stance [s]."""
 STEP_SWING_S = 0.38
-"""Time that a foot is in the air in a step that widens a stance [s]."""
+"""Swing time of a step that widens a stance [s]."""
 
 
 @kernel
 def get_down(down: float, worker: Worker) -> None:
-    """Lower a standing body by a share, heels included; its steps are planned elsewhere."""
+    """Lower a standing body by a share and raise its heels; its steps are planned elsewhere."""
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], worker.ahead * down, 0.0)
     kneel, crouch = worker.kneel * down, worker.crouch * down
@@ -85,37 +89,44 @@ def get_down(down: float, worker: Worker) -> None:
 
 
 @kernel
-def step_into(first: int, ahead: float, other: float, out: float, worker: Worker) -> None:
-    """Plan a step of one foot forward and one of the other.
+def step_into(
+    first: int, first_m: float, second_m: float, outward_m: float, worker: Worker
+) -> None:
+    """Plan a step of one foot, then optionally a step of the other foot.
+
+    Each foot moves from its footprint in `worker.stance`; displacements are relative to the initial
+    heading.
 
     Args:
         first: foot of the first step, 0 left, 1 right.
-        ahead: length of its step [m].
-        other: length of the other foot's step [m]; 0 for none.
-        out: sideways displacement of both [m].
-        worker: record that the plan is written into.
+        first_m: forward displacement of the first foot [m]; negative for a backward step.
+        second_m: forward displacement of the other foot [m]; 0 for no step.
+        outward_m: displacement of each foot away from the body's midline [m].
+        worker: record into which step times and both footprints in the world frame are written.
     """
     cos, sin = math.cos(worker.start_yaw), math.sin(worker.start_yaw)
     worker.step_start, worker.step_period = STEP_AT_S, STEP_PERIOD_S
     worker.step_swing = STEP_SWING_S
-    worker.step_first, worker.step_count = first, 1 if other == 0.0 else 2
-    for k in range(2):
-        side = (first + k) % 2
-        forward, left = (other if k else ahead), (1.0 - 2.0 * side) * out
-        for i in range(5):
-            worker.footprints[k, i] = worker.stance[side, i]
-        worker.footprints[k, 0] += cos * forward - sin * left
-        worker.footprints[k, 1] += sin * forward + cos * left
-        worker.footprints[k, 3] = 0.3
+    worker.step_first, worker.step_count = first, 1 if second_m == 0.0 else 2
+    for step in range(2):
+        side = (first + step) % 2
+        sign = 1.0 - 2.0 * side  # 1 on the left, -1 on the right
+        forward_m, left_m = (second_m if step else first_m), sign * outward_m
+        stance, footprint = worker.stance[side], worker.footprints[step]
+        for column in range(len(footprint)):
+            footprint[column] = stance[column]
+        footprint[_X] += cos * forward_m - sin * left_m
+        footprint[_Y] += sin * forward_m + cos * left_m
+        footprint[_STRIDE_SHARE] = _SHORT_STEP_SHARE
 
 
 @kernel
 def extend(down: float, out: float, worker: Worker) -> None:
-    """Lower a standing body and reach out to the work, with the tool from the belt.
+    """Lower a standing body, and move the tool from the belt to the work.
 
     Args:
-        down: share of getting down.
-        out: share of reaching out.
+        down: share by which the body is lowered.
+        out: share by which the hands have reached out.
         worker: record with the plan; its `q` is changed.
     """
     q, at = worker.q, c.PROP_POSE
@@ -133,13 +144,13 @@ def extend(down: float, out: float, worker: Worker) -> None:
 
 @kernel
 def _bulge_way(at: int, goal_z: float, out: float, worker: Worker) -> None:
-    """Bend the way of a point of the control vector around shoulder or knee.
+    """Add a bulge around shoulder or knee to the path of a point in the control vector.
 
     Args:
         at: column of the point's x.
-        goal_z: height of its goal [m].
-        out: share of the way that is done.
-        worker: record; its `q` is changed.
+        goal_z: height of the point's goal [m].
+        out: share of the path that has been covered.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
@@ -150,12 +161,12 @@ def _bulge_way(at: int, goal_z: float, out: float, worker: Worker) -> None:
 
 @kernel
 def place_hands(out: float, taken: float, early: float, worker: Worker) -> None:
-    """Send the tool's hand to the tool, and the other hand to its target.
+    """Set the targets of the hand with the tool and of the other hand.
 
     Args:
-        out: share of the way that the tool is out.
-        taken: share by which the tool's hand holds the tool.
-        early: share of getting down in which hands precede the body.
+        out: share of the way from the belt that the tool has covered.
+        taken: share by which the hand follows the tool.
+        early: share by which the hands have followed their targets while the body is lowered.
         worker: record with the plan; its `q` is changed.
     """
     q, side, tool = worker.q, worker.side, worker.tool
@@ -189,13 +200,13 @@ def place_hands(out: float, taken: float, early: float, worker: Worker) -> None:
 
 @kernel
 def _pass_belly(hand: int, at: int, share: float, worker: Worker) -> None:
-    """Move the target of a hand back to before the belly by a share, over the thighs.
+    """Move the target of a hand back over the thighs to a point in front of the belly.
 
     Args:
         hand: 0 left, 1 right.
         at: column of the target's x.
         share: share of the move.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, goal = worker.q, worker.target[3 * hand : 3 * hand + 3]
     x, y = locate_from_root(BELLY_AHEAD_M, (1.0 - 2.0 * hand) * BELLY_SIDE_M, worker)
@@ -206,11 +217,11 @@ def _pass_belly(hand: int, at: int, share: float, worker: Worker) -> None:
 
 @kernel
 def work(t: float, worker: Worker) -> None:
-    """Let a standing worker work in place with a tool or with empty hands.
+    """Add work in place, with a tool or with empty hands, to the pose of a standing worker.
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     near_end = min(t, worker.total_s - t)
     down = min_jerk(near_end / worker.settle_s)

@@ -1,7 +1,7 @@
-"""Plans of work in place: with tools, pointing, a lunge, with both hands at floor height.
+"""Plans of work in place: with tools, pointing, lunges, and low work with both hands.
 
-`plan_...` returns the peak speed of the hands on their way to the work [m/s], which
-`planning.finish_plan` takes.
+`plan_...` returns the peak speed of the hands on their way to the work [m/s], an argument of
+`planning.finish_plan`.
 """
 
 import math
@@ -21,60 +21,68 @@ HAMMER = PROP_NAMES.index("hammer")
 DRILL = PROP_NAMES.index("drill")
 HAND_SAW = PROP_NAMES.index("saw")
 TAPE = PROP_NAMES.index("tape_measure")
+_SCREW_STEP_M = 0.12
+"""Forward step of the foot opposite to the drill when driving screws [m]; judgement."""
+_SCREW_S = (1.0, 1.3)
+"""Range of the time to drive one screw [s]; judgement."""
+_GAZE_M = 0.18
+"""Distance of the gaze point ahead of the fist, and to its right, when driving screws [m]."""
+_GAZE_DOWN_M = 0.2
+"""Distance of the gaze point below the first screw when driving screws [m]."""
 LEVEL = Vector3(0.0, 0.0, 0.0)
-"""Turn of a tool that points straight ahead: yaw, pitch, roll [rad]."""
+"""Orientation of a tool that points straight ahead: yaw, pitch, roll [rad]."""
 HEAD_M = 0.25
 """Distance from the fist to the hammer's head along the handle [m], see `props`."""
 FACE_M = 0.05
-"""Distance from the handle to the face of the hammer [m], see `props`."""
+"""Distance from the handle to the hammer's striking face [m], see `props`."""
 LIGHT_HZ = 5.6
-"""Rate of light taps [Hz]; they move at most at 1.1 m/s; judgement."""
+"""Frequency of light taps [Hz]; their speed is at most 1.1 m/s; judgement."""
 LIGHT_M = 0.060
-"""Size of light taps, to and fro [m]; judgement."""
+"""Peak-to-peak size of light taps [m]; judgement."""
 LOW_SHARE = 0.7
-"""Size of blows at floor height relative to others; judgement."""
+"""Size of low blows relative to other blows; judgement."""
 WALL_M = 1.2
-"""Height from which nails go into a wall, not downwards [m]."""
+"""Height above which nails are driven into a wall instead of downwards [m]."""
 OVERHEAD_M = 1.7
-"""Height from which people work above their head [m]."""
+"""Height above which work is overhead [m]."""
 BIT_M = 0.22
-"""Distance of the tip of the bit ahead of the fist [m], see `props`."""
+"""Distance of the drill bit's tip ahead of the fist [m], see `props`."""
 BIT_UP_M = 0.09
-"""Height of the tip of the bit above the fist [m], see `props`."""
+"""Height of the drill bit's tip above the fist [m], see `props`."""
 THRUST_M = 0.04
 """Depth of a hole, and length of a screw [m]."""
 SCREWS = 4
 """Number of screws in the robot's workpiece."""
 SCREW_PITCH_M = 0.15
-"""Distance of a screw below the one before [m]."""
+"""Vertical distance between consecutive screws [m]."""
 FIST_AHEAD_M = 0.467
-"""Distance of the fist ahead of the feet in screwing the robot's workpiece [m]."""
+"""Distance of the fist ahead of the feet when driving screws into the robot's workpiece [m]."""
 FIST_LEFT_M = 0.127
-"""Distance of the fist to the left of the feet in screwing the robot's workpiece [m]."""
+"""Distance of the fist left of the feet when driving screws into the robot's workpiece [m]."""
 ASKEW_RAD = -0.25 * math.pi
-"""Yaw of the drill from the heading in screwing the robot's workpiece [rad]."""
+"""Yaw of the drill from the heading when driving screws into the robot's workpiece [rad]."""
 CUT_RAD = 0.6
-"""Pitch of the blade in the board [rad]; 45 to 60 degrees to it is usual, judgement."""
+"""Pitch of the saw blade [rad]; 45 to 60 degrees to the board are usual; judgement."""
 SHOULDER_SHARE = 1.50
-"""Height of the shoulder, in heights of the pelvis."""
+"""Height of the shoulder as a multiple of pelvis height."""
 SHOULDER_M = 0.19
-"""Distance of the shoulder from the middle [m]."""
+"""Lateral distance of the shoulder from the body's midline [m]."""
 POINT_M_S = 1.5
 """Peak speed of a pointing hand [m/s]; judgement."""
 NEAREST_ARMS = 1.2
-"""Least distance of the target of a lunge, in lengths of the arm; judgement."""
+"""Least distance of the target of a lunge, in arm lengths; judgement."""
 FARTHEST_ARMS = 1.5
-"""Greatest distance of the target of a lunge, in lengths of the arm; judgement."""
+"""Greatest distance of the target of a lunge, in arm lengths; judgement."""
 
 
 @kernel
 def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to drive nails.
+    """Plan to drive nails with a hammer.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -107,12 +115,12 @@ def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to drill.
+    """Plan to drill holes, at a wall or overhead.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -141,27 +149,35 @@ def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to drive screws, each below the one before.
+    """Plan to drive screws into the robot's workpiece with a drill, from top to bottom.
+
+    Positions are relative to the initial position and heading: ahead, left, height [m].
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: (N_START,) uniform draws in [0, 1): 0 the hand, 2 the time for a screw.
         height: height of the first screw [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
     """
     side = to.begin_plan(draws[0], worker)
-    to.plan_step_ahead(1 - side, 0.12, worker)
-    to.plan_tool(
-        DRILL,
-        side,
-        Vector3(FIST_AHEAD_M, FIST_LEFT_M, height - BIT_UP_M),
-        Vector3(ASKEW_RAD, 0.0, 0.0),
-        worker,
+    other_side = 1 - side
+    to.plan_step_ahead(other_side, _SCREW_STEP_M, worker)
+    fist = Vector3(FIST_AHEAD_M, FIST_LEFT_M, height - BIT_UP_M)
+    yaw_pitch_roll = Vector3(ASKEW_RAD, 0.0, 0.0)
+    to.plan_tool(DRILL, side, fist, yaw_pitch_roll, worker)
+    gaze = Vector3(FIST_AHEAD_M + _GAZE_M, FIST_LEFT_M - _GAZE_M, height - _GAZE_DOWN_M)
+    to.plan_gaze(gaze, worker)
+    screw_s = scale_draw(draws[2], _SCREW_S[0], _SCREW_S[1])
+    to.plan_strokes(
+        kind=strokes.PRESS,
+        size_m=THRUST_M,
+        rate_hz=0.0,
+        burst_s=screw_s,
+        n=SCREWS,
+        worker=worker,
     )
-    to.plan_gaze(Vector3(FIST_AHEAD_M + 0.18, FIST_LEFT_M - 0.18, height - 0.2), worker)
-    to.plan_strokes(strokes.PRESS, THRUST_M, 0.0, scale_draw(draws[2], 1.0, 1.3), SCREWS, worker)
     worker.down_m = SCREW_PITCH_M
     return CALM_M_S
 
@@ -173,7 +189,7 @@ def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -195,12 +211,12 @@ def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to measure with a tape.
+    """Plan to measure with a tape measure.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -219,12 +235,12 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_point(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to point somewhere ahead; the height has no effect.
+    """Plan to point in a random direction ahead; the height has no effect.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hand [m/s].
@@ -249,12 +265,12 @@ def plan_point(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_lunge(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to snatch at something ahead.
+    """Plan to lunge at a point ahead with one hand.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -281,7 +297,7 @@ def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -293,12 +309,12 @@ def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_squat(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to work near the floor on the haunches.
+    """Plan to squat and work near the floor.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -316,7 +332,7 @@ def _plan_hands_low(ahead: float, draws: Floats, height: float, worker: Worker) 
         ahead: distance of the work ahead of the feet [m].
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].

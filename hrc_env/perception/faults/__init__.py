@@ -1,1 +1,1 @@
-"""Faults of cameras, chosen by argument and drawn from a generator of their own."""
+"""Configurable faults of cameras, drawn from a separate random generator."""

@@ -1,4 +1,4 @@
-"""Images of cameras with their faults, drawn when windows of them are needed."""
+"""Images of cameras with faults, rendered when windows of them are requested."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, rows, write_rows
+from hrc_env.core.batching import map_arrays, rows, write_rows
 from hrc_env.core.records import Held, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -17,7 +17,7 @@ from hrc_env.perception.lenses import LensRenderer
 
 MovingT = TypeVar("MovingT", WorkerMotion, Held)
 BLUR_IMAGES = 5
-"""Number of images that are averaged for an image with an open shutter."""
+"""Number of renderings that are averaged for an image with motion blur."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +25,15 @@ class ScenePose:
     """The pose of a scene."""
 
     q: JointAngles
-    """(N,) joints of the robot, then fingers and loose objects, as `Physics.qpos` has them."""
+    """(N,) generalized positions of the robot, fingers and loose objects, in the order of
+    `Physics.qpos`."""
     motion: WorkerMotion
-    """(W, S, ...) the workers."""
+    """(W, S, ...) poses of the workers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A scene of a step, which images may show later."""
+    """The scene at a step, which an image may show at a later step."""
 
     step: int
     """Number of the step."""
@@ -41,15 +42,15 @@ class Shot:
     before: ScenePose
     """Pose of the scene one step earlier."""
     cameras: tuple[PinholeCamera, ...]
-    """Cameras with their actual poses at the step."""
+    """Cameras with their actual (not calibrated) poses at the step."""
 
 
 class CameraFilm:
-    """An `ImageSource` of the cameras' present images; black for cameras without one.
+    """An `ImageSource` of the cameras' present images, which are black for cameras without one.
 
     Args:
-        viewer: draws images as the lenses distort them.
-        schedule: behaviour of the cameras.
+        viewer: renderer of images with lens distortion.
+        schedule: schedule of the cameras' images and faults.
     """
 
     def __init__(self, viewer: LensRenderer, schedule: Schedule) -> None:
@@ -67,7 +68,7 @@ class CameraFilm:
         self._shots, self._seed, self._drawn = tuple(shots), seed, None
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's image, upright, (size, size, 3) RGB."""
+        """Render a window of a camera's image, upright, (size, size, 3) RGB."""
         shot = self._shots[camera_index]
         if shot is None:
             return np.zeros((self.renderer.size_px, self.renderer.size_px, 3), np.uint8)
@@ -79,7 +80,7 @@ class CameraFilm:
         return image
 
     def _expose(self, shot: Shot, c: int, window: Roi) -> Image:
-        """Return the mean image (size, size, 3) of the time for which the shutter was open."""
+        """Render the mean image (size, size, 3) over the exposure time."""
         camera, open_s = shot.cameras[c], self._now.exposure_s(c, shot.step)
         if open_s == 0.0:
             self._pose(shot, 0.0)
@@ -91,7 +92,7 @@ class CameraFilm:
         return np.round(total / BLUR_IMAGES).astype(np.uint8)
 
     def _pose(self, shot: Shot, ago_s: float) -> None:
-        """Pose the scene as it was a time before the shutter closed [s]."""
+        """Pose the scene as it was `ago_s` before the end of the exposure [s]."""
         if self._drawn != (shot.step, ago_s):
             pose = _pose_before(shot, ago_s / self.schedule.dt_s)
             self.renderer.pose(pose.q, pose.motion)
@@ -99,33 +100,33 @@ class CameraFilm:
 
 
 def _pose_before(shot: Shot, share: float) -> ScenePose:
-    """Return the pose of the scene a share of a step before a shot, by interpolation."""
+    """Interpolate the pose of the scene at a fraction `share` of a step before a shot."""
     if share == 0.0:
         return shot.pose
     motion, last = shot.pose.motion, shot.before.motion
     moved, held = _interpolate(motion, last, share), motion.held
     if held is not None and last.held is not None:
-        same = (held.kind == last.held.kind) & (held.kind > 0)  # an absent prop has no place
-        there = mapped(held, np.copy)
+        same = (held.kind == last.held.kind) & (held.kind > 0)  # an absent prop has no position
+        there = map_arrays(held, np.copy)
         write_rows(there, same, _interpolate(rows(held, same), rows(last.held, same), share))
         moved = replace(moved, held=there)
     return ScenePose(_mix(shot.pose.q, shot.before.q, share), moved)
 
 
 def _interpolate(now: MovingT, before: MovingT, share: float) -> MovingT:
-    """Return bodies or props at a share of the way back from `now` to `before`."""
+    """Interpolate the poses of bodies or props from `now` (share 0) to `before` (share 1)."""
     places = _mix(now.position_world, before.position_world, share)
     turns = _mix_quaternions(now.quaternion_wxyz, before.quaternion_wxyz, share)
     return replace(now, position_world=places, quaternion_wxyz=turns)
 
 
 def _mix(now: Floats, before: Floats, share: float) -> Floats:
-    """Return numbers at a share of the way back from `now` to `before`."""
+    """Interpolate numbers linearly from `now` (share 0) to `before` (share 1)."""
     return now + share * (before - now)
 
 
 def _mix_quaternions(now: Floats, before: Floats, share: float) -> Floats:
-    """Return quaternions (..., 4) at a share of the shorter way back from `now` to `before`."""
+    """Interpolate quaternions (..., 4) along the shorter path from `now` to `before`."""
     sign = np.where((now * before).sum(-1, keepdims=True) < 0, -1.0, 1.0)
     mixed = _mix(now, sign * before, share)
     return mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)

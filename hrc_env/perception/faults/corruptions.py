@@ -1,4 +1,4 @@
-"""Effects of faults on an image."""
+"""Effects of camera faults on images."""
 
 import math
 from collections.abc import Callable
@@ -16,27 +16,27 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.perception.faults.schedule import draws
 
 GAMMA = 2.2
-"""Exponent of images: light is their value to this power."""
+"""Gamma of the images: the amount of light is the pixel value to this power."""
 DIRT_RGB = (72, 64, 54)
 """Colour of dirt."""
 N_SPOTS = 14
 """Number of spots on a dirty lens."""
 COVER = 0.9
-"""Share of the light that the middle of a spot takes away."""
+"""Share of the light that the centre of a spot blocks."""
 RIM = 1.25
-"""Radius at which a spot ends, in its radii; inwards from there it grows darker over half a
-radius."""
+"""Outer radius of a spot, in units of its nominal radius; the blur at its edge has a width of half
+a nominal radius."""
 GLARE_REACH = 0.25
-"""Radius of the disc of haze around a light in the lens, as a share of the image's width."""
+"""Radius of the haze around a light that shines into the lens, as a share of the image's width."""
 GLARE_VEIL = 0.35
-"""Haze all over the image, as a share of that in the middle of the disc."""
+"""Uniform haze of the whole image, as a share of the haze at the light."""
 DARK_NOISE = 5.0
-"""Standard deviation of the noise of an image with 1/20 of the light [grey levels], a judgement of
-cheap sensors."""
+"""Standard deviation of the noise of an image with 1/20 of the light [grey levels]; an assumption
+about low-cost sensors."""
 
 
 class CropView(NamedTuple):
-    """A crop of an image that is to be corrupted."""
+    """A crop of an image to which a fault is applied."""
 
     crop: Image
     """(n, n, 3) RGB, which is not changed."""
@@ -45,21 +45,21 @@ class CropView(NamedTuple):
     window: Roi
     """Window of the image that the crop shows [px]."""
     seeds: tuple[int, ...]
-    """Seed of the episode's faults, then the numbers of fault, camera and step."""
+    """Seed of the episode's faults, and the numbers of the fault, the camera and the step."""
 
 
 def darkness_noise(share: float) -> float:
-    """Return the standard deviation of the noise of an image with a share of the light."""
+    """Return the standard deviation of the noise at a share of the light [grey levels]."""
     return DARK_NOISE * math.sqrt(max(1.0 - share, 0.0) / 0.95)
 
 
 def corrupt(view: CropView, fault: FaultConfig) -> Image:
-    """Return a crop with a fault of the group `IMAGE`, except motion blur (see `CameraFilm`)."""
+    """Apply a fault of the group `IMAGE` to a crop; `CameraFilm` applies motion blur."""
     return _CORRUPT[fault.kind](view, fault.max_amount)
 
 
 def _defocus(view: CropView, radius_px: float) -> Image:
-    """Return a crop in which points are discs of a radius in the image [px]."""
+    """Defocus a crop: points become discs of a given radius in the image [px]."""
     radius = radius_px * len(view.crop) / view.window.side_px
     reach = math.ceil(radius)
     away = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1])
@@ -68,9 +68,9 @@ def _defocus(view: CropView, radius_px: float) -> Image:
 
 
 def _add_noise(view: CropView, levels: float) -> Image:
-    """Return a crop with independent noise of each pixel of the camera [grey levels].
+    """Add independent noise of each camera pixel to a crop [grey levels].
 
-    If the crop is finer than the image, the noise is coarser than the crop.
+    If the crop has a higher resolution than the image, the noise is enlarged accordingly.
     """
     crop = view.crop
     n = min(max(round(view.window.side_px), 8), len(crop))
@@ -81,9 +81,9 @@ def _add_noise(view: CropView, levels: float) -> Image:
 
 
 def _add_dirt(view: CropView, share: float) -> Image:
-    """Return a crop with spots that hide a share of the image, the same for the whole episode.
+    """Add spots to a crop that hide a share of the image and are constant over an episode.
 
-    They are blurred, as they are out of focus.
+    The spots are blurred, because dirt on the lens is out of focus.
     """
     crop, rng, size_px = view.crop, draws(*view.seeds[:3]), _size_px(view)
     middles = rng.uniform(0.0, 1.0, (N_SPOTS, 2)) * size_px
@@ -100,23 +100,23 @@ def _add_dirt(view: CropView, share: float) -> Image:
 
 
 def _tint(view: CropView, share: float) -> Image:
-    """Return a crop with more red and less blue by a share."""
+    """Increase the red and reduce the blue values of a crop by a share."""
     return _image(view.crop * np.array([1.0 + share, 1.0, 1.0 - share]))
 
 
 def _expose(view: CropView, stops: float) -> Image:
-    """Return a crop with more light by a number of stops."""
+    """Increase the exposure of a crop by a number of stops."""
     values = 255.0 * (np.arange(256) / 255.0) * 2.0 ** (stops / GAMMA)
     return _image(cv2.LUT(view.crop, _image(values)))
 
 
 def _darken(view: CropView, share: float) -> Image:
-    """Return a crop with a share of the light, and with noise."""
+    """Reduce the light of a crop to a share, and add the corresponding noise."""
     return _add_noise(view._replace(crop=_expose(view, math.log2(share))), darkness_noise(share))
 
 
 def _add_glare(view: CropView, share: float) -> Image:
-    """Return a crop with haze around a light, at one place for the whole episode."""
+    """Add haze around a light to a crop, at a position that is constant over an episode."""
     crop = view.crop
     middle = draws(*view.seeds[:3]).uniform(0.2, 0.8, (1, 2)) * _size_px(view)
     (x, y), scale = _in_crop(middle, view)[0], len(crop) / view.window.side_px
@@ -143,11 +143,11 @@ def _size_px(view: CropView) -> Floats:
 
 
 def _in_crop(px: Points2, view: CropView) -> Points2:
-    """Return the pixels of the crop of image pixels (n, 2)."""
+    """Convert image pixels (n, 2) to pixels of the crop."""
     matrix = image_from_crop(view.window, len(view.crop))
     return (px - matrix[:, 2]) @ np.linalg.inv(matrix[:, :2]).T
 
 
 def _image(values: NDArray[Any]) -> Image:
-    """Return values rounded to grey levels."""
+    """Round and clip values to grey levels of uint8."""
     return np.clip(np.round(values), 0, 255).astype(np.uint8)

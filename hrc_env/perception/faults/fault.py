@@ -1,7 +1,7 @@
 """Faults of cameras: their kinds, amounts and times.
 
-Random numbers of faults come from a seed of their own in each episode: everything else is as with
-the same seed without faults.
+The random numbers of faults have a separate seed in each episode, so that faults do not change any
+other random numbers.
 """
 
 import numbers
@@ -11,29 +11,29 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 
 FOREVER_S = 1e9
-"""End of a fault that does not end [s]."""
+"""End time of a permanent fault [s]."""
 TIMING, PLACE, IMAGE = "timing", "place", "image"
-"""Groups of faults: of the times of images, of the pose and intrinsics of a camera, of the look of
-an image."""
+"""Groups of faults: of the timing of images, of the pose and intrinsics of a camera, and of the
+appearance of images."""
 
 
 class Kind(NamedTuple):
     """A kind of fault."""
 
     group: str
-    """Its group: `TIMING`, `PLACE` or `IMAGE`."""
+    """Group of the kind: `TIMING`, `PLACE` or `IMAGE`."""
     unit: str
-    """Unit of its amount."""
+    """Unit of the fault's amount."""
     usual: float
-    """Default of its amount, in the unit: clearly visible, but not absurd."""
+    """Default amount [unit], which is clearly visible but realistic."""
     bounds: tuple[float, float]
-    """Least and greatest amount, in the unit."""
+    """Minimum and maximum amount [unit]."""
     description: str
-    """A phrase that describes it."""
+    """Phrase that describes the fault."""
 
 
 KINDS: dict[str, Kind] = {
@@ -67,21 +67,21 @@ KINDS: dict[str, Kind] = {
     ),
     "glare": Kind(IMAGE, "share", 0.8, (0.0, 1.0), "a light shines into the lens"),
 }
-"""All kinds of faults by name."""
+"""All kinds of faults, by name."""
 ALL = "all"
-"""Word for every camera, in the place of a camera's name."""
+"""Value that stands for all cameras, instead of a camera's name."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class FaultConfig:
-    """One fault of some cameras during a part of every episode."""
+    """A fault of some cameras during a part of every episode."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "from_s": "start_s",
         "until_s": "end_s",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their old names."""
 
     kind: str
     """Kind of the fault, a key of `KINDS`."""
@@ -89,8 +89,8 @@ class FaultConfig:
     """Cameras with the fault, by name or by index (from 0) in the rig; ("all",) means every
     camera."""
     amount: float | tuple[float, float] | None = None
-    """Amount of the fault in the kind's unit; a pair (least, greatest) is a range from which each
-    episode's amount is drawn uniformly, None the kind's default."""
+    """Amount of the fault in the kind's unit. For a pair (minimum, maximum), each episode's amount
+    is drawn uniformly from this range; None is the kind's default."""
     start_s: float = 0.0
     """Time in the episode at which the fault begins [s]; 0 is the reset."""
     end_s: float = FOREVER_S
@@ -98,7 +98,7 @@ class FaultConfig:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise unknown("fault", self.kind, KINDS)
+            raise make_unknown_name_error("fault", self.kind, KINDS)
         named = isinstance(self.cameras, tuple) and all(map(_is_choice, self.cameras))
         if not named or not self.cameras:
             raise ConfigError(
@@ -127,12 +127,12 @@ class FaultConfig:
 
     @property
     def group(self) -> str:
-        """Group of its kind."""
+        """Group of the fault's kind."""
         return KINDS[self.kind].group
 
     @property
     def max_amount(self) -> float:
-        """Amount in the kind's unit; of a range the greatest."""
+        """Amount in the kind's unit; the maximum if it is a range."""
         if isinstance(self.amount, tuple):
             return self.amount[1]
         return KINDS[self.kind].usual if self.amount is None else self.amount
@@ -143,32 +143,34 @@ class FaultConfig:
         return isinstance(self.amount, tuple)
 
     def draw(self, rng: np.random.Generator) -> "FaultConfig":
-        """Return the fault of one episode, with an amount drawn from its range."""
+        """Return the fault of an episode, with an amount drawn from the range."""
         if not isinstance(self.amount, tuple):
             return self
         return replace(self, amount=float(rng.uniform(*self.amount)))
 
     def is_active(self, time_s: float) -> bool:
-        """Return whether an image of a time in the episode has the fault, to within 0.5 ms."""
+        """Return whether the fault is active at a time in the episode, to within 0.5 ms."""
         return self.start_s - 5e-4 <= time_s < self.end_s - 5e-4
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
-    """Raise `ConfigError` for a fault of a camera that is not in the rig with these names."""
+    """Raise `ConfigError` if a fault refers to a camera that is not in the rig with these names."""
     for fault in faults:
         for camera in fault.cameras:
             if not isinstance(camera, str):
                 label = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
-                whole(label, camera, 0, len(names) - 1)
+                check_integer(label, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
-                raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+                raise make_unknown_name_error(
+                    f"camera of fault {fault.kind!r}:", camera, (*names, ALL)
+                )
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a value is a number, and no truth value."""
+    """Return whether a value is a number but not a Boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_choice(camera: object) -> bool:
-    """Return whether a value is a name or an index."""
+    """Return whether a value is a name or an index of a camera."""
     return isinstance(camera, str | numbers.Integral) and not isinstance(camera, bool)

@@ -1,6 +1,6 @@
-"""Schedules of cameras: the image that a camera gives at a step, and its actual pose then.
+"""Schedules of cameras: the image that a camera delivers at a step, and its actual pose.
 
-Both follow from the episode's seed of faults, the step (0 is the reset's) and the camera.
+Both depend on the seed of the episode's faults, the step (0 is the reset) and the camera.
 """
 
 import functools
@@ -19,23 +19,22 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.faults.fault import ALL, KINDS, PLACE, TIMING, FaultConfig, check_cameras
 
 _AMOUNT = 0xA303
-"""Number that separates the draws of a fault's amount from those of its cameras, which count from
-0."""
+"""Number in place of the camera's index in the seed of a fault's amount, larger than any index."""
 _EARLY = 1e-6
 """Tolerance of times for rounding errors, as a share of a step."""
 
 
 class Frame(NamedTuple):
-    """An image that arrives."""
+    """An image that has arrived."""
 
     scene_step: int
-    """Step of the scene that it shows."""
+    """Step of the scene that the image shows."""
     taken_step: int
-    """Step at which it claims to have been taken."""
+    """Step of the image's timestamp."""
 
 
 class NumberedFault(NamedTuple):
-    """A fault with its number in the schedule, from which its random numbers follow."""
+    """A fault with its number in the schedule, which seeds its random numbers."""
 
     number: int
     """Index in the schedule."""
@@ -47,20 +46,19 @@ class Arrivals(NamedTuple):
     """The images that arrive at a step."""
 
     records: list[Any]
-    """(C,) record of the step that each camera shows; None: no image."""
+    """(C,) record of the step that each camera's image shows; None without an image."""
     times_s: Floats
-    """(C,) times at which they claim to have been taken, with the reset's at `dt_s` [s]; NaN: no
-    image."""
+    """(C,) timestamps of the images, where the reset is at `dt_s`; NaN without an image [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """The behaviour of cameras over an episode."""
+    """The timing of the cameras' images over an episode, and the cameras' faults."""
 
     cameras: tuple[CameraConfig, ...]
-    """The rig, as it is calibrated."""
+    """Cameras of the rig, with their calibrated poses."""
     faults: tuple[FaultConfig, ...]
-    """The faults of its cameras."""
+    """Faults of the cameras."""
     dt_s: float
     """Time between steps [s]."""
 
@@ -69,19 +67,19 @@ class Schedule:
 
     @property
     def is_plain(self) -> bool:
-        """Whether every camera gives a faultless image at once at every step."""
+        """Whether every camera delivers a faultless image without delay at every step."""
         return not self.faults and not any(
             camera.rate_hz or camera.latency_s or camera.exposure_s for camera in self.cameras
         )
 
     @property
     def max_delay_s(self) -> float:
-        """Greatest age of an image with its true time [s]."""
+        """Maximum age of an image with a correct timestamp [s]."""
         return self.dt_s * max(self._delay(c, None) for c in range(len(self.cameras)))
 
     @property
     def longest_memory(self) -> int:
-        """Greatest number of steps since the scene of an image, without frozen ones."""
+        """Maximum age of the scene in an image, apart from frozen images [steps]."""
         behind = [f.max_amount for f in self.faults if f.kind == "out_of_step"]
         return round(self.max_delay_s / self.dt_s) + math.ceil(max(behind, default=0.0))
 
@@ -91,14 +89,14 @@ class Schedule:
         return frozenset(self._frozen_at(f) for f in self.faults if f.kind == "frozen")
 
     def draw_episode(self, seed: int) -> "Schedule":
-        """Return the schedule of one episode, in which every fault has one amount."""
+        """Return the schedule of an episode, with an amount drawn for every fault."""
         if not any(fault.is_range for fault in self.faults):
             return self
         numbered = enumerate(self.faults)
         return replace(self, faults=tuple(f.draw(draws(seed, k, _AMOUNT)) for k, f in numbered))
 
     def faults_of(self, group: str, c: int, step: int | None) -> list[NumberedFault]:
-        """Return the faults of a group that camera c has at a step (None: at any)."""
+        """Return the faults of a group that camera c has at a step, or at any step if None."""
         name = self.cameras[c].name
         return [
             NumberedFault(k, fault)
@@ -109,7 +107,7 @@ class Schedule:
         ]
 
     def frame(self, seed: int, step: int, c: int) -> Frame | None:
-        """Return the newest image of camera c that arrives at a step; None if none does."""
+        """Return the newest image of camera c that arrives at a step, or None if there is none."""
         for taken in range(step, step - self._delay(c, None) - 1, -1):
             if taken < 0:
                 break
@@ -118,24 +116,24 @@ class Schedule:
         return None
 
     def exposure_s(self, c: int, step: int) -> float:
-        """Return the time for which the shutter was open for an image of a step [s]."""
+        """Return the exposure time of camera c's image at a step [s]."""
         return max([self.cameras[c].exposure_s, *self._amounts("motion_blur", c, step)])
 
     def actual_cameras(
         self, rig: tuple[PinholeCamera, ...], seed: int, step: int
     ) -> tuple[PinholeCamera, ...]:
-        """Return the cameras with their actual poses at a step; `rig` itself without faults.
+        """Return the cameras with their actual poses at a step, or `rig` itself without faults.
 
         Args:
-            rig: the cameras as they are calibrated.
-            seed: the episode's seed of faults.
+            rig: cameras with their calibrated poses.
+            seed: seed of the episode's faults.
             step: the step.
         """
         wrong = tuple(tuple(self.faults_of(PLACE, c, step)) for c in range(len(rig)))
         return _displace(rig, wrong, seed) if any(wrong) else rig
 
     def _is_taken(self, seed: int, step: int, c: int) -> bool:
-        """Return whether an image is due at a step, and neither lost nor dropped."""
+        """Return whether an image is due at a step and is neither lost nor dropped."""
         rate = self.cameras[c].rate_hz * self.dt_s
         due = not 0 < rate < 1 or math.floor(step * rate + _EARLY) > math.floor(
             (step - 1) * rate + _EARLY
@@ -148,34 +146,34 @@ class Schedule:
         return due
 
     def _delay(self, c: int, taken: int | None) -> int:
-        """Return the steps until an image arrives that is taken at a step (None: the most)."""
+        """Return the delay of an image taken at a step, or the maximum delay if None [steps]."""
         late_s = sum(self._amounts("late", c, taken))
         return math.ceil((self.cameras[c].latency_s + late_s) / self.dt_s - _EARLY)
 
     def _scene_step(self, taken: int, c: int) -> int:
-        """Return the step of the scene in an image that is taken at a step."""
+        """Return the step of the scene that an image taken at a step shows."""
         for _, fault in self.faults_of(TIMING, c, taken):
             if fault.kind == "frozen":
                 return self._frozen_at(fault)
         return max(0, taken - round(sum(self._amounts("out_of_step", c, taken))))
 
     def _amounts(self, kind: str, c: int, step: int | None) -> list[float]:
-        """Return the amounts of camera c's faults of a kind at a step (None: at any)."""
+        """Return the amounts of camera c's faults of a kind at a step, or at any step if None."""
         return [
             f.max_amount for _, f in self.faults_of(KINDS[kind].group, c, step) if f.kind == kind
         ]
 
     def _frozen_at(self, fault: FaultConfig) -> int:
-        """Return the last step before a camera froze."""
+        """Return the last step before a camera freezes."""
         return max(0, math.ceil(fault.start_s / self.dt_s - _EARLY) - 1)
 
 
 class History(Stateful):
-    """The last steps of B environments, with a record of each that an image may show.
+    """The history of B environments: records of those past steps that an image may show.
 
     Args:
         batch: number B of environments.
-        schedule: behaviour of the cameras.
+        schedule: schedule of the cameras' images and faults.
     """
 
     CHANGES = ("steps", "seeds", "_kept")
@@ -183,17 +181,17 @@ class History(Stateful):
     def __init__(self, batch: int, schedule: Schedule) -> None:
         self.schedule = schedule
         self.steps = np.full(batch, -1)
-        """(B,) the present step; -1 before the first."""
+        """(B,) number of the present step; -1 before the first step."""
         self.seeds: list[int] = [0] * batch
-        """(B,) each episode's seed of faults."""
+        """(B,) seed of the faults of each environment's episode."""
         self._kept: list[dict[int, Any]] = [{} for _ in range(batch)]
         self._episodes: dict[int, tuple[int, Schedule]] = {}
-        """Seed of faults and schedule of each environment's episode."""
+        """Seed of the faults, and schedule, of each environment's episode."""
         self._reach = max(1, schedule.longest_memory)
         self._pinned = schedule.frozen_steps
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-        """Begin environments `ids` anew, with seeds from children of their generators."""
+        """Reset environments `ids`, with seeds drawn from children of their generators."""
         for b in ids.tolist():
             child = rngs[b].spawn(1)[0]
             self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}
@@ -207,7 +205,7 @@ class History(Stateful):
         return known[1]
 
     def begin_step(self, b: int) -> int:
-        """Begin a step of environment b, drop records that are too old, and return its number."""
+        """Begin a step of environment b, delete outdated records, and return the step's number."""
         self.steps[b] += 1
         step = int(self.steps[b])
         for old in [each for each in self._kept[b] if each < step - self._reach]:
@@ -216,11 +214,11 @@ class History(Stateful):
         return step
 
     def record_at(self, b: int, step: int) -> Any:
-        """Return the record of a step of environment b; None if there is none."""
+        """Return the record of a step of environment b, or None if there is none."""
         return self._kept[b].get(step)
 
     def exchange(self, b: int, record: Any) -> Arrivals:
-        """Keep the record of the present step of environment b, and return the images of now."""
+        """Store the record of environment b's present step, and return the images that arrive."""
         schedule, seed, step = self.schedule_of(b), self.seeds[b], int(self.steps[b])
         self._kept[b][step] = record
         frames = [schedule.frame(seed, step, c) for c in range(len(schedule.cameras))]
@@ -230,7 +228,7 @@ class History(Stateful):
 
 
 def draws(*numbers: int) -> np.random.Generator:
-    """Return the generator of these numbers: seed, fault, then perhaps camera and step."""
+    """Return a random generator seeded by numbers: seed, fault, and optionally camera and step."""
     return np.random.default_rng(numbers)
 
 
@@ -238,7 +236,7 @@ def draws(*numbers: int) -> np.random.Generator:
 def _displace(
     rig: tuple[PinholeCamera, ...], wrong: tuple[tuple[NumberedFault, ...], ...], seed: int
 ) -> tuple[PinholeCamera, ...]:
-    """Return a rig (C,) with the faults (C,) of its cameras' poses and intrinsics."""
+    """Apply faults (C,) of poses and intrinsics to the cameras (C,) of a rig."""
     cameras: list[PinholeCamera] = []
     for c, (camera, faults) in enumerate(zip(rig, wrong, strict=True)):
         for k, fault in faults:
@@ -250,7 +248,7 @@ def _displace(
 def _apply_fault(
     camera: PinholeCamera, fault: FaultConfig, rng: np.random.Generator
 ) -> PinholeCamera:
-    """Return a camera with a fault of its pose or intrinsics, in a direction that is drawn."""
+    """Apply a fault of pose or intrinsics to a camera, in a random direction."""
     K, T_world_from_cam = camera.K.copy(), camera.T_world_from_cam.copy()
     if fault.kind == "wrong_focal":
         K[[0, 1], [0, 1]] *= 1.0 + fault.max_amount

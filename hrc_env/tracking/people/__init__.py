@@ -1,1 +1,1 @@
-"""Association of detections with workers, where there are several workers."""
+"""Association of detections with workers in environments with several workers."""

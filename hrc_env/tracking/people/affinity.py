@@ -1,9 +1,9 @@
-"""The affinity of a 2D pose in one camera to a body with predicted joints.
+"""Affinity between a 2D pose in one camera and a body with predicted joints.
 
-Each joint contributes the log likelihood ratio of a detection near its predicted pixel against one
-anywhere in the image; a gross error costs no more than the gate. The errors of a body's joints are
-correlated, so the affinity is the mean over joints, not the sum. A detector may exchange left and
-right, so the better of both readings counts.
+Each joint contributes the log-likelihood ratio of a detection near its predicted pixel against one
+anywhere in the image; the penalty of a gross error is limited by the gate. The errors of a body's
+joints are correlated; therefore the affinity is the mean over joints, not the sum. A detector may
+swap left and right; therefore the affinity is the larger of those with and without a swap.
 """
 
 import math
@@ -20,32 +20,32 @@ from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import compute_pixel_variance
 
 LEAST_JOINTS = 3
-"""Least number of joints of a pose that can belong to a worker."""
+"""Minimum number of joints of a pose that can belong to a worker."""
 FULL_JOINTS = 6
-"""Number of joints below which a pose has less affinity."""
+"""Number of joints below which the affinity of a pose is reduced in proportion."""
 _ISOTROPIC = np.eye(3)
 
 
 class Pose:
-    """A 2D pose that a camera has detected."""
+    """A 2D pose detected in one camera."""
 
     px: Annotated[Points2, (N_JOINTS, 2)]
     """Pixel of each joint."""
     sigma_px: Annotated[Floats, (N_JOINTS,)]
     """Standard deviation of each joint's pixel [px]."""
     ok: Annotated[NDArray[np.int8], (N_JOINTS,)]
-    """Whether the joint is a measurement (1) or missing (0)."""
+    """1 for each joint with a valid measurement, 0 for each missing joint."""
     sight: Annotated[Floats, (N_JOINTS, 3)]
     """Unit direction from the camera to each joint in the world frame."""
     free: bool
-    """Whether the pose has not been assigned yet."""
+    """Whether the pose can still be assigned."""
 
 
 POSE = dtype_of(Pose)
 
 
 class AssociationSettings(NamedTuple):
-    """`AssociationConfig` as compiled functions take it."""
+    """The fields of `AssociationConfig` as a named tuple, for compiled functions."""
 
     gate_sigma: float
     """Gate of a joint around its predicted pixel, in standard deviations."""
@@ -54,9 +54,9 @@ class AssociationSettings(NamedTuple):
     min_joints: int
     """Number of joints on which two cameras must agree for a new person."""
     merge_distance_m: float
-    """Distance between two bodies below which they are one person [m]."""
+    """Distance between two bodies below which they are considered one person [m]."""
     rejoin_distance_m: float
-    """Greatest distance of a new body from the hidden worker that it is taken for [m]."""
+    """Distance within which a new body is assigned to a tracked worker that no camera sees [m]."""
     image_area_px: float
     """Area of an image [px^2]."""
 
@@ -76,10 +76,10 @@ def project_body(
         camera: (3, 4) projection.
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        known: (J,) joints with a known position.
-        prediction_std_m: standard deviation of errors that `cov` does not hold [m].
-        image: (J, 3) u, v [px] and mean variance of a coordinate [px^2], filled in. The variance is
-            -1 for joints that are not known or not in front of the camera.
+        known: (J,) whether the joint's position is known.
+        prediction_std_m: standard deviation of errors that `cov` does not include [m].
+        image: (J, 3) u, v [px] and their mean variance [px^2], filled in. The variance is -1 for
+            joints that are unknown or not in front of the camera.
     """
     for j in range(len(mean)):
         image[j, 2] = -1.0
@@ -95,12 +95,12 @@ def project_body(
 
 @kernel(makes_arrays=True)
 def compute_affinity(image: Floats, pose: Pose, settings: AssociationSettings) -> float:
-    """Return the mean log likelihood ratio of a pose; 0 where it does not fit.
+    """Return the mean log-likelihood ratio of a pose, or 0 if the pose does not fit.
 
     Args:
-        image: (J, 3) predicted pixels and variances, of `project_body`.
+        image: (J, 3) predicted pixels and variances, from `project_body`.
         pose: the detected pose.
-        settings: the gate and the area of the image.
+        settings: settings that contain the gate and the area of the image.
     """
     as_detected = _score_reading(image, pose, False, settings)
     return max(as_detected, _score_reading(image, pose, True, settings))
@@ -110,13 +110,13 @@ def compute_affinity(image: Floats, pose: Pose, settings: AssociationSettings) -
 def _score_reading(
     image: Floats, pose: Pose, swapped: bool, settings: AssociationSettings
 ) -> float:
-    """Return the affinity of one reading of a pose; 0 where it does not fit.
+    """Return the affinity of a pose with or without a swap of sides, or 0 if it does not fit.
 
     Args:
-        image: (J, 3) predicted pixels and variances, of `project_body`.
+        image: (J, 3) predicted pixels and variances, from `project_body`.
         pose: the detected pose.
-        swapped: whether left and right of the pose are exchanged.
-        settings: the gate and the area of the image.
+        swapped: whether to swap left and right of the pose.
+        settings: settings that contain the gate and the area of the image.
     """
     z, sigma, ok, gate_sigma = pose.px, pose.sigma_px, pose.ok, settings.gate_sigma
     n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
@@ -126,7 +126,7 @@ def _score_reading(
             continue
         variance = sigma[k] * sigma[k] + image[j, 2]
         misfit = ((z[k, 0] - image[j, 0]) ** 2 + (z[k, 1] - image[j, 1]) ** 2) / variance
-        product *= variance  # one logarithm for all; absurd variances overflow to "no fit"
+        product *= variance  # one logarithm for all; huge variances overflow and do not fit
         total -= 0.5 * min(misfit, gate)
         n += 1
         n_near += misfit < gate

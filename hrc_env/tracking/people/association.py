@@ -1,12 +1,12 @@
-"""Association of the 2D poses in every camera with the workers that are tracked.
+"""Association of the 2D poses detected in every camera with workers.
 
-Poses that fit where a worker is predicted are assigned to that worker, in each camera so that all
-of them together fit best, and no pose is assigned twice. The remaining poses are compared across
-cameras. Poses of at least two cameras that belong to one body are assigned to a tracked worker at
-that place or to one who was lost from sight nearby, else to a slot without a track. Poses that no
-other camera confirms are not assigned, because views that do not fit their worker look like a new
-person. If the rig has a single camera, they are assigned to slots without a track while all tracked
-workers are seen.
+In each camera, poses that fit the prediction of a tracked worker are assigned to that worker, with
+the best total fit and each pose at most once. The remaining poses are compared across cameras. If
+poses in at least two cameras belong to one body, they are assigned to a tracked worker at that
+position, or to a nearby tracked worker that no camera sees, or else to a slot without a track.
+Poses that no other camera confirms are not assigned, because an erroneous view of a tracked worker
+resembles a new person. If the rig has a single camera, the remaining poses are assigned to slots
+without a track as long as the camera sees all tracked workers.
 """
 
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class AssociationConfig:
-    """When a 2D pose is assigned to a worker.
+    """Settings for the assignment of 2D poses to workers.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
@@ -59,22 +59,23 @@ class AssociationConfig:
         "apart_m": "merge_distance_m",
         "rejoin_m": "rejoin_distance_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     gate_sigma: float = 5.0
-    """Gate of a joint around its predicted pixel, in standard deviations. Half of a pose's joints
-    must be within it."""
+    """Gate of a joint around its predicted pixel, in standard deviations. At least half of a pose's
+    joints must be within it."""
     prediction_std_m: float = 0.05
-    """Standard deviation of errors that predictions do not account for [m]: errors of a detector
-    persist for half a second, and people start and stop."""
+    """Standard deviation of errors that predictions do not account for [m], such as persistent
+    errors of the detector and sudden movements."""
     min_joints: int = 8
-    """Number of joints, of 15, on which two cameras must agree for a new person."""
+    """Number of joints, out of 15, on which two cameras must agree for a new person."""
     merge_distance_m: float = 0.35
-    """Distance between two bodies below which they are one person [m]."""
+    """Distance between two bodies below which they are considered one person [m]."""
     rejoin_distance_m: float = 1.0
-    """Distance within which a new body is taken for a tracked worker that no camera sees [m]."""
+    """Distance within which a new body is assigned to a tracked worker that no camera sees [m]."""
     image_area_px: float = 1920.0 * 1080.0
-    """Area of an image [px^2]. Its inverse is the density of poses that belong to no worker."""
+    """Area of an image [px^2]. Its inverse is the probability density of joints that belong to no
+    worker."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "gate_sigma", "min_joints", "image_area_px")
@@ -85,12 +86,12 @@ class AssociationConfig:
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """Keypoints by worker, and the poses that they come from."""
+    """Keypoints assigned to workers, and the indices of the assigned poses."""
 
     keypoints: Keypoints
     """(B, C, W, J, ...) keypoints; missing where a camera has no pose of a worker."""
     pose: Ints
-    """(B, C, W) index of the camera's pose; -1 for none."""
+    """(B, C, W) index of the camera's pose that was assigned to the worker; -1 if there is none."""
 
 
 def associate(
@@ -100,12 +101,12 @@ def associate(
 
     Args:
         P: (C, 3, 4) projections from the world [m] to pixels.
-        detected: (B, C, D, J, ...) D poses a camera in any order; missing ones are NaN.
+        detected: (B, C, D, J, ...) D poses per camera in any order; missing ones are NaN.
         predicted: (B, W, ...) prediction of the workers for the time of these frames.
-        config: when a pose is assigned; None for the defaults.
+        config: settings of the assignment; None for the defaults.
 
     Raises:
-        ConfigError: arrays have other shapes. Their values raise nothing.
+        ConfigError: an array has another shape. The values of the arrays are not checked.
     """
     cameras = cameras_of(P)
     batch, n_workers = predicted.tracked.shape
@@ -136,11 +137,11 @@ def _associate_all(
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) scratch for the poses of one environment.
+        poses: (C, D) work array for the poses of one environment.
         detected: (B, C, D, J, ...) detections.
         predicted: (B, W, ...) prediction of the workers.
-        settings: when a pose is assigned.
-        pose: (B, C, W) index of the assigned pose, filled in; must be -1.
+        settings: settings of the assignment.
+        pose: (B, C, W) indices of the assigned poses, initially -1, filled in.
         out: (B, C, W, J, ...) detections of the assigned poses, filled in.
     """
     for b in range(len(pose)):
@@ -159,7 +160,7 @@ def _associate_all(
 
 @kernel(makes_arrays=True)
 def _read_poses(px: Points2, confidence: Floats, sigma_px: Floats, poses: Records2[Pose]) -> None:
-    """Fill in the poses (C, D) of one environment; those with too few joints are not free.
+    """Fill in the poses (C, D) of one environment; poses with too few joints are not assignable.
 
     Args:
         px: (C, D, J, 2) pixels.
@@ -192,11 +193,11 @@ def _assign_to_tracked(
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) their poses; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned ones are no longer free.
         mean: (W, J, 3) predicted joints [m].
-        cov: (W, J, 3, 3) their covariances [m^2].
+        cov: (W, J, 3, 3) covariances of the joints [m^2].
         tracked: (W,) whether the worker is tracked.
-        settings: when a pose is assigned.
+        settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
     n_workers, n_poses = len(tracked), poses.shape[1]
@@ -215,7 +216,7 @@ def _assign_to_tracked(
         assign_rows(fit, column)
         for w in range(n_workers):
             d: int = column[w]
-            if fit[w, d] < 0.0:  # 0: no pose fits, or it fits another better
+            if fit[w, d] < 0.0:  # 0 if no pose fits or another worker fits better
                 chosen[c, w] = d
                 poses[c, d].free = False
 
@@ -229,14 +230,14 @@ def _assign_new_people(
     settings: AssociationSettings,
     chosen: Ints,
 ) -> None:
-    """Assign the poses that several cameras have of one body to the worker that it can be.
+    """Assign the poses of each body that several cameras see to the worker that it belongs to.
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) their poses; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned ones are no longer free.
         mean: (W, J, 3) predicted joints [m].
         tracked: (W,) whether the worker is tracked.
-        settings: when a pose is assigned.
+        settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
     (n_cameras, n_poses), n_workers = poses.shape, len(tracked)
@@ -287,10 +288,10 @@ def _assign_new_people(
 
 @kernel(makes_arrays=True)
 def _find_best(proposals: Proposals, poses: Records2[Pose], n: int) -> int:
-    """Return the index of the proposal that the cameras fit best with unassigned poses, or -1.
+    """Return the index of the proposed body that unassigned poses fit best, or -1 if there is none.
 
     Args:
-        proposals: bodies with the poses that fit them.
+        proposals: proposed bodies with the poses that fit them.
         poses: (C, D) poses of the cameras.
         n: number of proposals.
     """
@@ -317,19 +318,19 @@ def _find_worker(
     unseen: Bools,
     settings: AssociationSettings,
 ) -> int:
-    """Return the index of the worker that a body belongs to, or -1 for none.
+    """Return the index of the worker to which a body belongs, or -1 if there is none.
 
-    This is a worker tracked at that place, else a tracked worker that no camera sees nearby, else
-    the slot without a track with the nearest last estimate, so that a person returns to the same
-    slot.
+    This is the nearest tracked worker within `merge_distance_m`; otherwise the nearest tracked
+    worker that no camera sees, within `rejoin_distance_m`; otherwise the slot without a track that
+    has the nearest last estimate, so that people return to their slots.
 
     Args:
         body: the body.
         mean: (W, J, 3) joints of the workers [m].
-        tracked: (W,) workers with a track.
-        vacant: (W,) slots without a track.
-        unseen: (W,) workers with a track that no camera sees.
-        settings: the distances within which a body belongs to a worker.
+        tracked: (W,) whether the worker has a track.
+        vacant: (W,) whether the slot has no track.
+        unseen: (W,) whether the worker has a track but no camera sees the worker.
+        settings: settings that contain these distances.
     """
     distance = np.empty(len(tracked))
     for w in range(len(tracked)):
@@ -342,12 +343,12 @@ def _find_worker(
 
 @kernel(makes_arrays=True)
 def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
-    """Return the index of the nearest of some workers, or -1 if none is near enough.
+    """Return the index of the nearest of some workers, or -1 if none is within the limit.
 
     Args:
         distance: (W,) distances [m].
-        among: (W,) the workers to choose from.
-        limit: greatest distance, excluded [m].
+        among: (W,) whether the worker may be chosen.
+        limit: distance below which a worker may be chosen [m].
     """
     best = -1
     for w in range(len(distance)):
@@ -360,7 +361,7 @@ def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
 def _measure_distance(body: Body, mean: Points3) -> float:
     """Return the distance between a body and a worker (J, 3) [m]; infinite without common joints.
 
-    It is that of the means over the joints known of both.
+    It is the distance between the mean positions of the joints that both have.
     """
     points, met = body.points, body.met
     n, dx, dy, dz = 0, 0.0, 0.0, 0.0

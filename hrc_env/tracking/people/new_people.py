@@ -1,12 +1,11 @@
-"""People without a track: poses of several cameras that belong to one body.
+"""Detection of people without a track from the poses in several cameras.
 
-Any two poses of two cameras propose a body: the points where the lines of sight of their joints
-meet, provided that enough of them meet and that the bones have plausible lengths. Each other camera
-then contributes the pose that fits that body, and the proposal that the cameras fit best is a
-person. A pose that only one camera has seen is no person (after RapidPoseTriangulation, arXiv
-2503.21692).
+Any two poses in two cameras propose a body, which consists of the points where the lines of sight
+of their joints meet, if enough of them meet and the bones have plausible lengths. Each other camera
+contributes the pose that fits the body best, and the proposal with the best total fit is considered
+a person. A pose that only one camera sees is not (after RapidPoseTriangulation, arXiv 2503.21692).
 
-All functions work on one environment, with cameras (C,) and their poses (C, D).
+All functions process one environment, with cameras (C,) and their poses (C, D).
 """
 
 from typing import NamedTuple
@@ -27,50 +26,50 @@ from hrc_env.tracking.people.affinity import (
 )
 
 MEETING_M = 0.03
-"""Standard deviation of the gap between lines of sight for other reasons than noise [m]."""
+"""Standard deviation of the gap between two lines of sight apart from pixel noise [m]."""
 AGREEING_SHARE = 0.6
-"""Least share of the common joints of two poses with lines of sight that meet."""
+"""Minimum share of two poses' common joints for which the lines of sight must meet."""
 SHORTEST = 0.5
-"""Least length of a bone, as a share of the population's mean."""
+"""Minimum length of a bone, relative to the population mean."""
 LONGEST = 1.6
-"""Greatest length of a bone, as a share of the population's mean."""
+"""Maximum length of a bone, relative to the population mean."""
 BONE_SLACK_M = 0.08
 """Tolerance added to both limits of a bone's length [m]."""
 GOOD_BONES = 0.7
-"""Least share of a body's bones with lengths within the limits."""
+"""Minimum share of a body's bones with lengths within the limits."""
 BODY_SLACK_M = 0.1
-"""Standard deviation of a body made from two lines of sight, when other cameras see it [m]."""
+"""Standard deviation of a body made from two poses, for the comparison with other cameras [m]."""
 
 
 class Body(NamedTuple):
-    """A body made from two poses."""
+    """A body made from the poses in two cameras."""
 
     points: Points3
     """(J, 3) points where the lines of sight meet [m]."""
     met: Bools
-    """(J,) whether the joint's lines of sight meet; other points have no meaning."""
+    """(J,) whether the joint's lines of sight meet; other points are undefined."""
 
 
 class Proposals(NamedTuple):
-    """Bodies that pairs of cameras propose: room for all of them, filled from the front."""
+    """Arrays for N bodies proposed by pairs of cameras, filled from the front."""
 
     seeds: Ints
-    """(N, 4) first camera, its pose, second camera, its pose."""
+    """(N, 4) indices of the first camera, its pose, the second camera and its pose."""
     members: Ints
-    """(N, C) the pose of each camera that fits the body best; -1 for none."""
+    """(N, C) index of each camera's pose that fits the body best; -1 if there is none."""
     scores: Floats
-    """(N, C) the affinities of these poses."""
+    """(N, C) affinities of these poses."""
 
 
 @kernel(makes_arrays=True)
 def make_body() -> Body:
-    """Return room for a body."""
+    """Return empty arrays for a body."""
     return Body(np.empty((N_JOINTS, 3)), np.empty(N_JOINTS, np.bool_))
 
 
 @kernel(makes_arrays=True)
 def make_proposals(n_cameras: int, n_poses: int) -> Proposals:
-    """Return room for the proposals of all pairs of cameras with `n_poses` each."""
+    """Return empty arrays for the proposals of all pairs of cameras with `n_poses` poses each."""
     n = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
     members, scores = np.empty((n, n_cameras), np.int64), np.empty((n, n_cameras))
     return Proposals(np.empty((n, 4), np.int64), members, scores)
@@ -78,7 +77,7 @@ def make_proposals(n_cameras: int, n_poses: int) -> Proposals:
 
 @kernel(makes_arrays=True)
 def fill_sight_lines(cameras: Records1[Camera], poses: Records2[Pose]) -> None:
-    """Fill in the lines of sight of the poses (C, D) that are not assigned yet."""
+    """Fill in the lines of sight of the unassigned poses among `poses` (C, D)."""
     for c in range(poses.shape[0]):
         back = cameras[c].back
         for d in range(poses.shape[1]):
@@ -92,18 +91,19 @@ def fill_sight_lines(cameras: Records1[Camera], poses: Records2[Pose]) -> None:
 def intersect_poses(
     camera_1: Camera, camera_2: Camera, pose_1: Pose, pose_2: Pose, gate_sigma: float, body: Body
 ) -> int:
-    """Find the points where the lines of sight of two poses meet.
+    """Compute the points where the lines of sight of two poses meet.
 
     Args:
         camera_1: the camera of the first pose.
         camera_2: the camera of the second pose.
         pose_1: the first pose, with its lines of sight.
         pose_2: the second pose, with its lines of sight.
-        gate_sigma: gap within which lines meet, in standard deviations.
+        gate_sigma: gap up to which two lines meet, in standard deviations.
         body: the points, filled in.
 
     Returns:
-        The number of joints that meet; 0 if they are too few of the common ones.
+        The number of joints for which the lines meet, or 0 if these are too few of the common
+        joints.
     """
     points, met, ok_1, ok_2 = body.points, body.met, pose_1.ok, pose_2.ok
     n_common, n_met = 0, 0
@@ -112,7 +112,7 @@ def intersect_poses(
         if not (ok_1[j] and ok_2[j]):
             continue
         if n_common - n_met > (1.0 - AGREEING_SHARE) * len(points):
-            return 0  # the rest cannot make it good
+            return 0  # the remaining joints cannot suffice
         n_common += 1
         far_1, far_2, gap = nearest_places(
             camera_1.eye, pose_1.sight[j], camera_2.eye, pose_2.sight[j], points[j]
@@ -136,7 +136,7 @@ def _is_ahead(camera: Floats, point: Points3) -> bool:
 
 @kernel(makes_arrays=True)
 def has_good_bones(body: Body) -> bool:
-    """Return whether most bones between joints that met have plausible lengths."""
+    """Return whether enough bones between triangulated joints have plausible lengths."""
     points, met, n, good = body.points, body.met, 0, 0
     for k in range(len(BONES)):
         i: int = BONES[k, 0]
@@ -159,14 +159,14 @@ def fit_cameras(
     member: Ints,
     score: Floats,
 ) -> None:
-    """Find the pose of each camera that fits a body best, among those not assigned yet.
+    """Find the unassigned pose in each camera that fits a body best.
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) their poses.
+        poses: (C, D) poses in each camera.
         body: the body.
-        settings: the gate and the area of the image.
-        member: (C,) index of the pose, filled in; -1 for none.
+        settings: settings that contain the gate and the area of the image.
+        member: (C,) index of the pose, or -1 if there is none; filled in.
         score: (C,) affinity of the pose, filled in.
     """
     points = body.points
@@ -188,13 +188,13 @@ def propose_bodies(
     settings: AssociationSettings,
     proposals: Proposals,
 ) -> int:
-    """Fill in the bodies that pairs of cameras propose, and return their number.
+    """Fill in the bodies proposed by pairs of cameras, and return their number.
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) their poses, with lines of sight.
-        settings: the gates and the least number of joints.
-        proposals: room for all proposals.
+        poses: (C, D) poses in each camera, with lines of sight.
+        settings: settings of the assignment.
+        proposals: arrays for all proposals, filled in.
     """
     seeds, members = proposals.seeds, proposals.members
     n_cameras, n_poses = poses.shape

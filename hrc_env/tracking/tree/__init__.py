@@ -1,1 +1,1 @@
-"""The default estimator by stage: a body is a Gaussian on its kinematic tree, or several."""
+"""The stages of the default estimator, in which Gaussians on a kinematic tree represent a body."""

@@ -1,8 +1,8 @@
-"""Acquisition: a track begins, is repaired and is given up, where views agree.
+"""Acquisition of bodies on which views agree: tracks are started, repaired and ended.
 
-Two cameras that name sides alike triangulate limbs; two that do not meet nowhere, unless one's
-sides are exchanged. That splits the cameras in two camps before there is a body; their numbers
-decide which of them is right, and the body that they show: the nose and the toes are in front.
+The lines of sight of two cameras meet at the limbs only if both cameras label left and right alike.
+This divides the cameras into two groups before a body is known. The sizes of the groups, and the
+position of nose and toes in front of the body, decide which group labels the sides correctly.
 """
 
 import math
@@ -22,28 +22,30 @@ from hrc_env.tracking.tree.gaussian import PARENT, is_positive_definite
 from hrc_env.tracking.tree.report import forget_pace
 from hrc_env.tracking.tree.state import STANDING_M, Tree, Work, WorkerHypotheses
 
+_LEAST_VARIANCE = 1e-4
+"""Lower bound on the variances of a repaired joint [m^2, m^2/s^2]."""
 WIDEST_STD_M = 0.5
 """Standard deviation above which a triangulated joint is not used [m]."""
 _GUESS_STD_M = 0.3
-"""Standard deviation of a joint that is guessed from a body of known heading [m]."""
+"""Standard deviation of a joint guessed from a body of known heading [m]."""
 _GUESS_STD_WITHOUT_HEADING_M = 0.6
-"""The same where the heading is unknown [m]."""
+"""Standard deviation of a joint guessed from a body of unknown heading [m]."""
 _MIRROR = tuple(int(j) for j in MIRROR)
 _SWAP_COST = 4.0
-"""Negative log-probability that one camera exchanges left and right [nat]."""
+"""Negative log-probability that a camera swaps left and right labels [nat]."""
 _MOST = 5.0
-"""Greatest misfit that one joint counts for [nat]."""
+"""Upper bound of the misfit of one joint [nat]."""
 _FITS = 0.4
-"""Share of the greatest misfit above which two cameras, left and right exchanged or not, are not
-compared: one may be turned against its calibration."""
+"""Mean misfit, relative to its upper bound, above which two cameras are not compared, because one
+of them may be rotated relative to its calibration."""
 _FOUND_SPEED_STD_M_S = 1.0
-"""Standard deviation of the speed of a joint that has just been found [m/s]."""
+"""Standard deviation of the speed of a joint that has just been acquired [m/s]."""
 _FURTHEST_STD = 8.0
-"""Distance from the prior's mean beyond which a body is lost, in the prior's deviations."""
+"""Distance from the prior mean beyond which a track is dropped, in prior standard deviations."""
 
 
 class Misfit(NamedTuple):
-    """How badly the lines of sight of two cameras meet."""
+    """Misfit between the lines of sight of two cameras."""
 
     total: float
     """Negative log-likelihood over the joints [nat]."""
@@ -53,10 +55,10 @@ class Misfit(NamedTuple):
 
 @kernel(makes_arrays=True)
 def start_track(worker: WorkerHypotheses, frame: Frame, settings: Settings) -> bool:
-    """Begin a track where two views agree on a worker; return whether they did.
+    """Start a track if two views agree on a worker, and return whether they do.
 
     Args:
-        worker: the hypotheses of one worker, of which one is left.
+        worker: the hypotheses about one worker, replaced by a single one.
         frame: the measurements.
         settings: settings of the estimator.
     """
@@ -71,7 +73,7 @@ def start_track(worker: WorkerHypotheses, frame: Frame, settings: Settings) -> b
 
 @kernel(makes_arrays=True)
 def acquire(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Put a tree where two views agree on enough joints; return whether they did."""
+    """Set a tree to the body on which two views agree, if any, and return whether they do."""
     n_joints = len(tree.body)
     points, spread = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
     found = np.empty(n_joints, np.bool_)
@@ -87,13 +89,13 @@ def acquire(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel(makes_arrays=True)
 def _place_joint(body: Floats, cov: Floats, point: Floats, spread: Floats) -> None:
-    """Put a joint at rest at a point.
+    """Set a joint to rest at a point.
 
     Args:
-        body: (6,) receives position and velocity.
-        cov: (6, 6) receives their covariance.
+        body: (6,) position and velocity, filled in.
+        cov: (6, 6) covariance of position and velocity, filled in.
         point: (3,) the position [m].
-        spread: (3, 3) its covariance [m^2].
+        spread: (3, 3) covariance of the position [m^2].
     """
     body[:3], body[3:] = point, 0.0
     cov[:] = 0.0
@@ -109,12 +111,12 @@ def find_body(frame: Frame, settings: Settings, points: Floats, cov: Floats, fou
     Args:
         frame: the measurements.
         settings: settings of the estimator.
-        points: (J, 3) receives the positions [m].
-        cov: (J, 3, 3) receives their covariances [m^2].
-        found: (J,) receives which joints were triangulated.
+        points: (J, 3) positions [m], filled in.
+        cov: (J, 3, 3) covariances of the positions [m^2], filled in.
+        found: (J,) whether the joint was triangulated, filled in.
 
     Returns:
-        Whether there are enough joints for a body.
+        Whether enough joints were triangulated for a body.
     """
     use = np.empty(len(frame.P), np.bool_)
     for j in range(len(points)):
@@ -130,18 +132,18 @@ def find_body(frame: Frame, settings: Settings, points: Floats, cov: Floats, fou
 def find_again(
     frame: Frame, j: int, settings: Settings, middle: Floats, point: Floats, cov: Floats
 ) -> bool:
-    """Triangulate one joint, if two views agree on it near the body's middle.
+    """Triangulate one joint if two views agree on a position near the centre of the body.
 
     Args:
         frame: the measurements.
-        j: the joint.
+        j: index of the joint.
         settings: settings of the estimator.
-        middle: (3,) middle of the body [m].
-        point: (3,) receives the position [m].
-        cov: (3, 3) receives its covariance [m^2].
+        middle: (3,) centre of the body [m].
+        point: (3,) position [m], filled in.
+        cov: (3, 3) covariance of the position [m^2], filled in.
 
     Returns:
-        Whether they agree.
+        Whether two views agree on such a position.
     """
     use = np.empty(len(frame.P), np.bool_)
     if _triangulate(frame, j, settings, point, cov, use) < 2:
@@ -154,20 +156,20 @@ def find_again(
 def _triangulate(
     frame: Frame, j: int, settings: Settings, point: Floats, cov: Floats, use: Bools
 ) -> int:
-    """Triangulate one joint; return the number of views that agree, and which in `use` (C,)."""
+    """Triangulate one joint; return the number of agreeing views and mark them in `use` (C,)."""
     z, sigma, ok = frame.z[j], frame.sigma[j], frame.ok[j]
     return consensus_point(frame.P, z, sigma, ok, settings.gate_sigma, point, cov, use)
 
 
 @kernel(makes_arrays=True)
 def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) -> int:
-    """Drop joints that are too uncertain or too far from the others; return how many stay.
+    """Drop joints that are too uncertain or too far from the others; return the number of the rest.
 
     Args:
         points: (J, 3) positions [m].
-        cov: (J, 3, 3) their covariances [m^2].
-        found: (J,) which joints count, changed in place.
-        radius_m: greatest distance of a joint from the body's middle [m].
+        cov: (J, 3, 3) covariances of the positions [m^2].
+        found: (J,) whether the joint is used, changed in place.
+        radius_m: largest distance of a joint from the centre of the body [m].
     """
     middle, n_found = np.empty(3), 0
     for j in range(len(points)):
@@ -185,12 +187,12 @@ def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) ->
 
 @kernel(makes_arrays=True)
 def find_middle(points: Floats, among: Bools, out: Floats) -> bool:
-    """Write the median of some points, axis by axis; return False if there is none.
+    """Compute the median of some points on each axis; return whether there are any points.
 
     Args:
         points: (J, 3+) positions [m].
-        among: (J,) which points count.
-        out: (3,) receives the median [m].
+        among: (J,) whether the point is used.
+        out: (3,) median [m], filled in.
     """
     values = np.empty(len(points))
     for i in range(3):
@@ -207,18 +209,18 @@ def find_middle(points: Floats, among: Bools, out: Floats) -> bool:
 
 @kernel
 def distance(a: Floats, b: Floats | tuple[float, float, float]) -> float:
-    """Return the Euclidean distance of two points (3+,)."""
+    """Return the Euclidean distance between two points (3+,)."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @kernel(makes_arrays=True)
 def complete_body(points: Floats, cov: Floats, found: Bools) -> None:
-    """Guess missing joints from a standing body that is turned like the torso.
+    """Guess missing joints from a standing body with the heading of the torso.
 
     Args:
-        points: (J, 3) positions [m], filled in place.
-        cov: (J, 3, 3) their covariances [m^2], filled in place.
-        found: (J,) which joints are given.
+        points: (J, 3) positions [m], filled in for missing joints.
+        cov: (J, 3, 3) covariances of the positions [m^2], filled in for missing joints.
+        found: (J,) whether the joint is given.
     """
     heading = find_heading_from(points, found[1] and found[2], found[7] and found[8])
     cos, sin = heading.cos, heading.sin
@@ -243,7 +245,7 @@ def complete_body(points: Floats, cov: Floats, found: Bools) -> None:
 
 @kernel(makes_arrays=True)
 def agree_on_sides(frame: Frame, settings: Settings) -> None:
-    """Mirror the measurements of cameras that exchange left and right, in place."""
+    """Correct the measurements of cameras with swapped left and right labels, in place."""
     n_cameras, n_joints = len(frame.P), len(_MIRROR)
     gain = np.zeros((n_cameras, n_cameras))
     for a in range(n_cameras):
@@ -272,9 +274,9 @@ def agree_on_sides(frame: Frame, settings: Settings) -> None:
 
 @kernel(makes_arrays=True)
 def _find_camp(gain: Floats) -> Bools:
-    """Return (C,) the smaller set of cameras that name sides otherwise than the rest.
+    """Return a mask (C,) of the minority of cameras that label left and right unlike the others.
 
-    `gain` (C, C) is the decrease of two cameras' misfit [nat] if one of them is mirrored.
+    `gain` (C, C) is the decrease of the misfit of two cameras [nat] if one of them is mirrored.
     """
     other = gain[0] > _SWAP_COST
     for _ in range(len(gain)):
@@ -304,13 +306,13 @@ def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
 
 @kernel(makes_arrays=True)
 def _measure_misfit(frame: Frame, a: int, b: int, is_mirrored: bool) -> Misfit:
-    """Return the misfit of the limbs' joints in two cameras.
+    """Return the misfit of the joints that have a left and a right side in two cameras.
 
     Args:
         frame: the measurements.
         a: index of the first camera.
         b: index of the second camera.
-        is_mirrored: whether the second camera's left and right are exchanged.
+        is_mirrored: whether to swap left and right of the second camera.
     """
     total, n_joints = 0.0, 0
     use, z, point = np.zeros(len(frame.P), np.bool_), np.empty((len(frame.P), 2)), np.empty(3)
@@ -331,13 +333,13 @@ def _measure_misfit(frame: Frame, a: int, b: int, is_mirrored: bool) -> Misfit:
 
 @kernel
 def recover(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
-    """Find joints or the whole body again where the views say so; give up a lost body.
+    """Reacquire joints or the whole body where views contradict the estimate; end invalid tracks.
 
     Args:
         tree: the updated hypothesis, changed in place.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch.
+        work: work arrays.
     """
     is_placed = work.is_placed
     is_placed[:] = _acquire_anew(tree, frame, settings)
@@ -353,13 +355,13 @@ def recover(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
 def _find_joints_again(
     tree: Tree, frame: Frame, settings: Settings, is_placed: NDArray[np.int8]
 ) -> None:
-    """Put joints where two views have seen them for a while.
+    """Reacquire joints that views have contradicted for `conflict_frames` updates.
 
     Args:
         tree: the updated hypothesis, changed in place.
         frame: the measurements.
         settings: settings of the estimator.
-        is_placed: (J,) is set to 1 for these joints.
+        is_placed: (J,) set to 1 for these joints, in place.
     """
     everything, middle = np.ones(len(is_placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
@@ -374,7 +376,7 @@ def _find_joints_again(
 
 @kernel
 def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Start over when the views have long agreed on another body; return whether they have."""
+    """Reacquire the whole body if enough joints are contradicted; return whether it succeeded."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= settings.conflict_frames
@@ -386,33 +388,44 @@ def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _repair(tree: Tree, settings: Settings) -> bool:
-    """Keep covariances positive definite; put a body that has left the world back to the prior.
+    """Repair covariances that are not positive definite, and reset an implausible body.
+
+    Such a covariance loses everything but its diagonal. If any joint is not finite, or more than
+    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are put back to
+    the prior, at rest, and the track is lost.
+
+    Args:
+        tree: the hypothesis, changed in place: `body` (J, 6) positions [m] and velocities [m/s] in
+            the world frame, `cov` (J, 6, 6) their covariances.
+        settings: mean and standard deviation of the prior position, and greatest age.
 
     Returns:
-        Whether nothing had to be changed.
+        True if nothing had to be changed.
     """
-    body, cov, is_inside, is_proper = tree.body, tree.cov, True, True
-    for j in range(len(body)):
-        if not is_positive_definite(cov[j]):
+    states, covariances = tree.body, tree.cov
+    prior_mean, prior_std_m = settings.prior_mean_world, settings.prior_std_m
+    is_inside, is_proper = True, True
+    for j in range(len(states)):
+        if not is_positive_definite(covariances[j]):
             is_proper = False
             for i in range(6):
-                variance = cov[j, i, i]
-                cov[j, i, :], cov[j, :, i] = 0.0, 0.0
-                cov[j, i, i] = max(variance, 1e-4)
-        away = distance(body[j], settings.prior_mean_world)
-        variances, numbers = 0.0, 0.0
+                variance = covariances[j, i, i]
+                covariances[j, i, :], covariances[j, :, i] = 0.0, 0.0
+                covariances[j, i, i] = max(variance, _LEAST_VARIANCE)
+        from_prior_m = distance(states[j], prior_mean)
+        variance_sum, state_sum = 0.0, 0.0
         for i in range(6):
-            variances += cov[j, i, i]  # where these are finite, the covariances between them are
-            numbers += body[j, i]
-        is_near = away < _FURTHEST_STD * settings.prior_std_m
-        is_inside &= is_near and math.isfinite(variances + numbers)
+            variance_sum += covariances[j, i, i]  # if finite, all covariances of the joint are
+            state_sum += states[j, i]
+        is_near = from_prior_m < _FURTHEST_STD * prior_std_m
+        is_inside &= is_near and math.isfinite(variance_sum + state_sum)
     if is_inside:
         return is_proper
     tree.tracked = False
-    for j in range(len(body)):
+    for j in range(len(states)):
         tree.age_s[j] = settings.max_age_s
         for i in range(6):
-            body[j, i] = settings.prior_mean_world[i] if i < 3 else 0.0
+            states[j, i] = prior_mean[i] if i < 3 else 0.0
             for k in range(6):
-                cov[j, i, k] = settings.prior_std_m**2 if i == k else 0.0
+                covariances[j, i, k] = prior_std_m**2 if i == k else 0.0
     return False

@@ -1,9 +1,9 @@
-"""The way of a measurement through the default estimator: one loop over environments and workers.
+"""Prediction and update of the default estimator, in loops over environments and workers.
 
-`update_all` reads a worker's measurements as each hypothesis takes them (`measurements`),
-conditions the hypothesis on them (`update`, which searches the mode first: `search`), weighs it
-(`evidence`), learns from it (`learning`), searches for other hypotheses (`branching`), repairs
-contradicted joints (`acquisition`), and prunes and merges.
+For each hypothesis about a worker, `update_all` prepares the measurements (`measurements`), finds
+the posterior mode (`search`), conditions the hypothesis (`update`), weights it (`evidence`) and
+learns from it (`learning`). It also searches for alternative hypotheses (`branching`), reacquires
+contradicted joints (`acquisition`), and prunes and merges hypotheses.
 """
 
 from hrc_env.core.declared import Records1
@@ -38,7 +38,7 @@ from hrc_env.tracking.tree.update import condition_on_frame
 
 _TORSO = (1, 2, 7, 8)
 _WALKING_M_S = 0.5
-"""Speed along the heading from which a body surely walks forwards [m/s]."""
+"""Speed along the heading from which a body certainly walks forwards [m/s]."""
 
 
 @kernel(makes_arrays=True)
@@ -59,8 +59,8 @@ def update_all(
         measured: pixels, confidences and standard deviations of all workers.
         settings: settings of the estimator.
         noise_model: constants for learning the measurement noise.
-        works: (1,) scratch.
-        prior: (1,) scratch for a hypothesis before its update.
+        works: (1,) work arrays.
+        prior: (1,) work array for a hypothesis before its update.
     """
     frame, work = make_frame(cameras), works[0]
     for b in range(state.n_alive.shape[0]):
@@ -92,18 +92,18 @@ def _update_worker(
     work: Work,
     prior: Records1[Tree],
 ) -> None:
-    """Update the hypotheses about a tracked worker, and search for others if it is time.
+    """Update the hypotheses about a tracked worker, and search for alternatives if that is due.
 
     Args:
         worker: the worker's hypotheses, changed in place.
         measured: pixels, confidences and standard deviations of all workers.
         b: index of the environment.
         w: index of the worker.
-        frame: room for the worker's measurements.
+        frame: measurements of the worker, filled in.
         settings: settings of the estimator.
         noise_model: constants for learning the measurement noise.
-        work: scratch.
-        prior: (1,) scratch for a hypothesis before its update.
+        work: work arrays.
+        prior: (1,) work array for a hypothesis before its update.
     """
     if worker.trees[0].size_std > 0.0:
         read_worker(measured, b, w, settings.sigma_scale, frame)
@@ -139,7 +139,7 @@ def _update_worker(
 
 @kernel(makes_arrays=True)
 def select_worker(state: Hypotheses, b: int, w: int) -> WorkerHypotheses:
-    """Return views of the hypotheses about worker w of environment b."""
+    """Return views of the hypotheses about worker `w` in environment `b`."""
     return WorkerHypotheses(
         state.trees[b, w],
         state.views[b, w],
@@ -154,14 +154,14 @@ def select_worker(state: Hypotheses, b: int, w: int) -> WorkerHypotheses:
 def predict_all(
     state: Hypotheses, model: MotionModel, dt: float, settings: Settings, works: Records1[Work]
 ) -> None:
-    """Move and age every worker's hypotheses by a time step.
+    """Predict every worker's hypotheses after a time step.
 
     Args:
         state: the hypotheses, changed in place.
         model: motion over the time step.
         dt: the time step [s].
         settings: settings of the estimator.
-        works: (1,) scratch.
+        works: (1,) work arrays.
     """
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
@@ -177,14 +177,14 @@ def predict_all(
 def _move_worker(
     worker: WorkerHypotheses, model: MotionModel, dt: float, settings: Settings, work: Work
 ) -> None:
-    """Move a worker's hypotheses; several at once learn no places on the body.
+    """Move a worker's hypotheses; if there are several, joint offsets are not learnt.
 
     Args:
         worker: the worker's hypotheses, changed in place.
         model: motion over the time step.
         dt: the time step [s].
         settings: settings of the estimator.
-        work: scratch.
+        work: work arrays.
     """
     has_rivals = worker.n_alive[0] > 1
     for h in range(worker.n_alive[0]):
@@ -201,7 +201,7 @@ def _move_worker(
 
 @kernel
 def _age_worker(worker: WorkerHypotheses, dt: float, settings: Settings) -> None:
-    """Count ages up by `dt` [s]; give up a track without support and let a lost one relax."""
+    """Increase ages by `dt` [s], end a track without support, and relax a lost one to the prior."""
     tree = worker.trees[0]
     tree.tracked = age_worker(
         tree.body[:, :3],
@@ -221,7 +221,7 @@ def _age_worker(worker: WorkerHypotheses, dt: float, settings: Settings) -> None
 
 @kernel
 def _score_walk(body: Floats) -> float:
-    """Return how clearly a body (J, 6) walks forwards, from -1 (backwards) to 1."""
+    """Return a score from -1, if a body (J, 6) walks backwards, to 1, if it walks forwards."""
     heading = find_heading(body)
     if not heading.is_known:
         return 0.0

@@ -1,15 +1,15 @@
-"""Branching: other bodies that one view can hardly distinguish from the one that is tracked.
+"""Search for alternative bodies that one view can hardly distinguish from the tracked one.
 
-A camera sees a limb in front of its joint as it sees it behind (the bas-relief ambiguity). A limb
-is reflected: its joints keep their rays, and their depths are reflected in the depth of a pivot.
-From there the posterior's mode is searched for, under the same prediction and frame: a mode
-several posterior deviations from the known ones, with evidence that is not negligible, becomes a
-hypothesis.
+In one view, a limb that points towards the camera looks almost like one that points away from it
+(the bas-relief ambiguity). To find the alternative, a limb is reflected: its joints stay on their
+rays, and their depths are reflected about the depth of a pivot. From there, a posterior mode is
+searched for with the same prediction and frame. If the mode is several posterior standard
+deviations from the existing ones and its evidence is not negligible, it becomes a hypothesis.
 
-A whole body is turned instead: a line from shoulder to shoulder that recedes looks like one that
-comes nearer. The other body has its shoulders and hips reflected across the ray to its middle, but
-is no mirror image: it is the same body, turned, with nose and toes in front again. Its uncertainty
-is the reflected one, because it lies along the same ray.
+A whole body is rotated instead, because in one view a shoulder line that recedes looks like one
+that approaches. The alternative has its shoulders and hips reflected across the ray to its centre.
+It is not a mirror image, but the same body rotated, with nose and toes in front again. Its
+covariance is the reflected one, because the uncertainty lies along the same ray.
 """
 
 import math
@@ -37,24 +37,26 @@ from hrc_env.tracking.tree.state import Tree, Work, WorkerHypotheses
 from hrc_env.tracking.tree.update import condition_on_frame, correct_mean, update_tree
 
 _LOG_LEAST_EVIDENCE = math.log(0.01)
-"""Log-evidence, relative to the known mode's, below which a limb's other mode is left out."""
+"""Log-evidence, relative to that of the existing mode, below which a limb's other mode is
+ignored."""
 _MOST_PENALTY = 10.0
-"""Negative log-probability above which a turned body is not tried [nat]."""
+"""Negative log-probability above which a rotated body is not tried [nat]."""
 _DISTINCT = 3.0
-"""Distance from the known hypotheses above which a mode is new, in posterior deviations."""
+"""Distance from the existing hypotheses above which a mode is new, in posterior standard
+deviations."""
 _SEARCH_STEPS = 4
-"""Gauss-Newton steps from a mirror image."""
+"""Number of Gauss-Newton steps from a reflected limb."""
 _NEARER_M = 0.05
-"""A search that ends with every joint nearer to the known mode than this has found no other [m]."""
+"""Largest coordinate difference of joints below which two modes are the same [m]."""
 
 
 class Part(NamedTuple):
-    """A part of the body that is reflected."""
+    """A part of the body that may be reflected."""
 
     pivot: tuple[int, ...]
-    """Joints of which the mean is the pivot."""
+    """Indices of the joints with the pivot as their mean."""
     moved: tuple[int, ...]
-    """Joints that are reflected."""
+    """Indices of the joints that are reflected."""
 
 
 _PARTS = (
@@ -70,18 +72,18 @@ _PARTS = (
     Part((1, 2), (0,)),  # head
 )
 N_PARTS = len(_PARTS)
-"""Number of parts that are reflected."""
+"""Number of parts that may be reflected."""
 WHOLE_BODY = 0
-"""The part that is the whole body; the others are limbs and the head."""
+"""Index of the part that is the whole body; the other parts are limbs and the head."""
 _MOST_SEEN_TWICE = 2
-"""Most joints that two cameras may see of a whole body that counts as seen by one alone."""
+"""Largest number of joints that several cameras may see if a body counts as seen by one camera."""
 _TORSO = (1, 2, 7, 8)
 _LEAST_TURN_RAD = 0.35
-"""Angle between two headings below which bodies are one hypothesis [rad]."""
+"""Angle between two headings below which two bodies are the same hypothesis [rad]."""
 
 
 def _mark_joints(joints: list[tuple[int, ...]]) -> Bools:
-    """Return (n, J) which joints belong to each of n groups."""
+    """Return a mask (n, J) of the joints in each of n groups."""
     table = np.zeros((len(joints), N_JOINTS), bool)
     for row, group in enumerate(joints):
         table[row, list(group)] = True
@@ -94,7 +96,7 @@ _MOVED = _mark_joints([part.moved for part in _PARTS])
 
 @kernel
 def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Return whether one camera leaves open the depth of any part of a predicted body."""
+    """Return whether the depth of any part of a predicted body is ambiguous in a single view."""
     ambiguous = False
     for part in range(N_PARTS):
         ambiguous = ambiguous or _find_ambiguous_view(part, tree, frame, settings) >= 0
@@ -103,16 +105,16 @@ def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings) -> int:
-    """Return the only camera that sees a part, if the prediction leaves its depth open, or -1.
+    """Return the only camera that sees a part if the part's depth is ambiguous, or else -1.
 
-    That one camera alone sees it in this frame is not enough: measurements of other cameras a
-    moment ago still count in the prediction.
+    The depth of a part that one camera sees is not ambiguous if recent measurements by other
+    cameras still determine the predicted depth.
 
     Args:
         part: index of the part.
         tree: the predicted hypothesis.
         frame: the measurements.
-        settings: settings of the estimator, with the parts that may be reflected.
+        settings: settings of the estimator.
     """
     if not (settings.mirrors_body if part == WHOLE_BODY else settings.mirrors_limbs):
         return -1
@@ -132,15 +134,15 @@ def branch(
     settings: Settings,
     work: Work,
 ) -> None:
-    """Search for other bodies beside the heaviest hypothesis, and add them as hypotheses.
+    """Search for alternatives to the heaviest hypothesis, and add them to the hypotheses.
 
     Args:
-        worker: the hypotheses of one worker, of which the first has been updated.
+        worker: the hypotheses about one worker, of which the first has been updated.
         prior: (1,) the first hypothesis before its update.
         evidence: log-evidence of that update.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch.
+        work: work arrays.
     """
     trees = worker.trees
     for part in range(N_PARTS):
@@ -172,19 +174,19 @@ def _try_turned_body(
     settings: Settings,
     work: Work,
 ) -> float:
-    """Make tree n the body that is turned the other way.
+    """Set tree `n` to the body with the alternative heading, conditioned on the frame.
 
     Args:
-        trees: (H,) the worker's hypotheses; tree n is a copy of the first.
+        trees: (H,) the worker's hypotheses, of which tree `n` is a copy of the first.
         n: slot of the new hypothesis.
-        camera: index of the camera that alone sees the body.
+        camera: index of the only camera that sees the body.
         prior: (1,) the first hypothesis before its update.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch.
+        work: work arrays.
 
     Returns:
-        Negative log-probability of the turn [nat]; infinite if such a body is known already.
+        Negative log-probability of the rotation [nat]; infinite if a hypothesis has this heading.
     """
     new, eye = trees[n], frame.cameras[camera].eye
     turn = find_other_turn(eye, prior[0].body)
@@ -202,13 +204,13 @@ def _try_turned_body(
 
 @kernel(makes_arrays=True)
 def _restore_prediction(tree: Tree, prior: Tree) -> None:
-    """Give an updated tree the Gaussian before the update; lengths and offsets stay."""
+    """Restore the Gaussian of a tree before its update, without its lengths and offsets."""
     tree.body[:], tree.cov[:], tree.slope[:] = prior.body, prior.cov, prior.slope
 
 
 @kernel
 def _has_known_heading(trees: Records1[Tree], n: int) -> bool:
-    """Return whether tree n faces the same way as one of those before it."""
+    """Return whether tree `n` has the same heading as one of the trees before it."""
     alike = False
     for k in range(n):
         alike |= has_same_heading(trees[n].body, trees[k].body)
@@ -225,19 +227,19 @@ def _search_mode(
     settings: Settings,
     work: Work,
 ) -> float:
-    """Condition tree n at the mode next to a reflected limb.
+    """Search for the posterior mode near a reflected limb, and set tree `n` to it.
 
     Args:
-        trees: (H,) the worker's hypotheses; tree n is a copy of the first.
+        trees: (H,) the worker's hypotheses, of which tree `n` is a copy of the first.
         n: slot of the new hypothesis.
         prior: the first hypothesis before its update.
         evidence: log-evidence of that update.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch; `point` is where the search begins.
+        work: work arrays; the search starts at `point`.
 
     Returns:
-        0, or infinity where the search ends at a known hypothesis or with negligible evidence.
+        0, or infinity if the search ends at an existing hypothesis or with negligible evidence.
     """
     new, known = trees[n], trees[0].body
     _restore_prediction(new, prior)
@@ -262,11 +264,11 @@ def _search_mode(
 
 @kernel
 def find_lone_camera(part: int, ok: Bools) -> int:
-    """Return the camera that alone sees a part of the body, or -1.
+    """Return the index of the only camera that sees a part of the body, or -1 if there is none.
 
     Args:
         part: index of the part.
-        ok: (J, C) which joints each camera measured.
+        ok: (J, C) whether the camera measured the joint.
     """
     n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
     for c in range(n_cameras):
@@ -285,13 +287,13 @@ def find_lone_camera(part: int, ok: Bools) -> int:
 
 @kernel(makes_arrays=True)
 def measure_depth_std(part: int, eye: Floats, body: Floats, cov: Floats) -> float:
-    """Return the least standard deviation of a part's joints along their rays [m].
+    """Return the smallest standard deviation of a part's joints along their rays [m].
 
     Args:
         part: index of the part.
         eye: (3,) optical centre of the camera [m].
         body: (J, 6) positions and velocities.
-        cov: (J, 6, 6) their covariances.
+        cov: (J, 6, 6) covariances of positions and velocities.
     """
     ray, least = np.empty(3), np.inf
     for j in range(len(body)):
@@ -310,16 +312,16 @@ def measure_depth_std(part: int, eye: Floats, body: Floats, cov: Floats) -> floa
 
 @kernel(makes_arrays=True)
 def reflect(part: int, eye: Floats, body: Floats, out: Floats) -> bool:
-    """Write the positions of a body of which a part is reflected along a camera's rays.
+    """Reflect a part of a body in depth along a camera's rays.
 
     Args:
         part: index of the part.
         eye: (3,) optical centre of the camera [m].
         body: (J, 6) positions and velocities.
-        out: (J, 3) receives the positions [m].
+        out: (J, 3) positions of the reflected body [m], filled in.
 
     Returns:
-        False if that brings a joint to the camera or behind it; `out` has no meaning then.
+        Whether all joints remain in front of the camera; otherwise `out` is undefined.
     """
     middle, n = np.zeros(3), 0
     for j in range(len(body)):
@@ -345,9 +347,9 @@ def reflect(part: int, eye: Floats, body: Floats, out: Floats) -> bool:
 
 @kernel
 def find_other_turn(eye: Floats, body: Floats) -> float:
-    """Return the angle by which the other body is turned from a body (J, 6), seen from `eye` (3,).
+    """Return the rotation from a body (J, 6) to its alternative, seen from `eye` (3,).
 
-    It is in [-pi, pi] [rad], and 0 if the heading is unknown.
+    The angle is in [-pi, pi] [rad], and 0 if the heading is unknown.
     """
     heading = find_heading(body)
     if not heading.is_known:
@@ -356,8 +358,8 @@ def find_other_turn(eye: Floats, body: Floats) -> float:
     for j in _TORSO:
         x += 0.25 * body[j, 0]
         y += 0.25 * body[j, 1]
-    # forwards is across the shoulders, so that reflecting the shoulders across the ray
-    # turns it to the mirror image of its opposite
+    # forward is perpendicular to the shoulder line; therefore, reflecting the shoulders across the
+    # ray rotates it to the mirror image of its opposite
     ray = math.atan2(y - eye[1], x - eye[0])
     turn = 2.0 * ray - 2.0 * math.atan2(heading.sin, heading.cos)
     return math.atan2(math.sin(turn), math.cos(turn))
@@ -365,21 +367,21 @@ def find_other_turn(eye: Floats, body: Floats) -> float:
 
 @kernel
 def has_same_heading(one: Floats, other: Floats) -> bool:
-    """Return whether two bodies (J, 6) face the same way."""
+    """Return whether two bodies (J, 6) have almost the same heading."""
     a, b = find_heading(one), find_heading(other)
     return a.cos * b.cos + a.sin * b.sin > math.cos(_LEAST_TURN_RAD)
 
 
 @kernel(makes_arrays=True)
 def turn_body(eye: Floats, turn: float, body: Floats, cov: Floats, slope: Floats) -> None:
-    """Make a Gaussian that of the body turned the other way.
+    """Rotate a Gaussian body to its alternative heading, in place.
 
     Args:
-        eye: (3,) optical centre of the camera that alone sees the body [m].
+        eye: (3,) optical centre of the only camera that sees the body [m].
         turn: angle about the vertical, as `find_other_turn` returns it [rad].
         body: (J, 6) means, changed in place.
-        cov: (J, 6, 6) covariances, reflected in place along the ray to the body's middle.
-        slope: (J, 6, 6) slopes, likewise.
+        cov: (J, 6, 6) covariances, reflected in place along the ray to the body's centre.
+        slope: (J, 6, 6) slopes on the parents, reflected likewise.
     """
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)
     for j in _TORSO:
@@ -394,7 +396,7 @@ def turn_body(eye: Floats, turn: float, body: Floats, cov: Floats, slope: Floats
     cos, sin = math.cos(turn), math.sin(turn)
     for j in range(len(body)):
         x, y = body[j, 0] - middle[0], body[j, 1] - middle[1]
-        # relative to the body as it turns; the other one turns the other way
+        # relative to the rotating body; the alternative rotates in the opposite direction
         vx, vy = body[j, 3] - middle[3] + rate * y, body[j, 4] - middle[4] - rate * x
         body[j, 0], body[j, 1] = middle[0] + cos * x - sin * y, middle[1] + sin * x + cos * y
         x, y = body[j, 0] - middle[0], body[j, 1] - middle[1]

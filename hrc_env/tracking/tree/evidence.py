@@ -1,18 +1,18 @@
-"""Evidence: how likely each hypothesis about a worker is; prune and merge.
+"""Weights of the hypotheses about a worker; pruning and merging.
 
-A hypothesis is weighed by Laplace's approximation. For a predicted Gaussian N(m, C), a posterior
-that is Gaussian about its mode x with covariance S, and the robust likelihood L of the frame and
-the bones,
+A hypothesis is weighted by Laplace's approximation of its evidence. For a predicted Gaussian
+N(m, C), a posterior that is Gaussian about its mode x with covariance S, and the robust likelihood
+L of the frame and the bones,
 
-log p(frame) = log L(x) - 1/2 (x - m)' C^-1 (x - m) + 1/2 log det S - 1/2 log det C,
+log p(frame) = log L(x) - 1/2 (x - m)' C^-1 (x - m) + 1/2 log det S - 1/2 log det C.
 
-and both determinants and the square are sums over the tree's joints, because with the part R_j =
-C_j - B_j C_q B_j' that joint j does not share with its parent q, det C is the product of det R_j.
-Terms that all hypotheses share are left out.
+The logarithms of both determinants and the quadratic form are sums over the tree's joints: with the
+conditional covariance R_j = C_j - B_j C_q B_j' of joint j given its parent q, det C is the product
+of all det R_j. Terms that all hypotheses share are omitted.
 
-Bodies have the nose, the toes and the knees in front, and a body that is tracked mirrored in depth
-has them behind. That weighs hypotheses as a potential of the present pose, not anew with every
-frame: it does not add up.
+Bodies have nose, toes and knees in front, but a body that is tracked mirrored in depth has them
+behind. This plausibility of the current pose replaces that of the previous pose in the weight;
+therefore it does not accumulate over frames.
 """
 
 import math
@@ -34,38 +34,40 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 class Feature(NamedTuple):
-    """A joint that people have before or behind the middle of two others."""
+    """Distribution of a joint's position along the heading, relative to the mean of two others."""
 
     joint: int
-    """The joint."""
+    """Index of the joint."""
     first: int
-    """The first of the two others."""
+    """Index of the first other joint."""
     second: int
-    """The second of them."""
+    """Index of the second other joint."""
     ahead_m: float
-    """Mean distance of the joint before their middle, along the heading [m]."""
+    """Mean distance of the joint in front of the mean of the two others [m]."""
     std_m: float
     """Standard deviation of that distance [m]."""
 
 
 _FEATURES = (
-    Feature(0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders
-    Feature(13, 11, 11, 0.12, 0.10),  # toes before the ankles
+    Feature(0, 1, 2, 0.12, 0.10),  # the nose in front of the shoulders
+    Feature(13, 11, 11, 0.12, 0.10),  # the toes in front of the ankles
     Feature(14, 12, 12, 0.12, 0.10),
-    Feature(9, 7, 11, 0.06, 0.12),  # knees before the middle of the leg
+    Feature(9, 7, 11, 0.06, 0.12),  # the knees in front of the legs
     Feature(10, 8, 12, 0.06, 0.12),
-    Feature(3, 1, 5, -0.05, 0.12),  # elbows behind the middle of the arm
+    Feature(3, 1, 5, -0.05, 0.12),  # the elbows behind the arms
     Feature(4, 2, 6, -0.05, 0.12),
 )
-"""Judgements from common proportions, wide enough for turned heads and feet."""
+"""Expected positions of nose, toes, knees and elbows, estimated from common proportions; the
+standard deviations allow for turned heads and feet."""
 _MOST = 4.5
-"""Greatest penalty of one feature [nat]: that of three standard deviations."""
+"""Upper bound of the penalty of one feature [nat], which corresponds to three standard
+deviations."""
 _CLOSE = 2.0
 """Distance below which two hypotheses are merged, in posterior standard deviations."""
 
 
 class TreeMeasure(NamedTuple):
-    """A change of the body as a Gaussian on the tree measures it."""
+    """Size of a change of the body under a Gaussian on the tree, and the Gaussian's determinant."""
 
     squared: float
     """Squared Mahalanobis length of the change."""
@@ -74,14 +76,14 @@ class TreeMeasure(NamedTuple):
 
 
 class Heading(NamedTuple):
-    """The direction in which a body faces, on the floor."""
+    """The direction in which a body faces, projected onto the floor."""
 
     cos: float
     """Cosine of the angle from the world's x axis; 0 if unknown."""
     sin: float
-    """Sine of that angle; 0 if unknown."""
+    """Sine of the angle from the world's x axis; 0 if unknown."""
     is_known: bool
-    """Whether shoulders and hips are far enough apart, seen from above."""
+    """Whether the left and right joints are far enough apart, seen from above, for a heading."""
 
 
 @kernel
@@ -90,11 +92,11 @@ def log_evidence(prior: Tree, tree: Tree, frame: Frame, settings: Settings, work
 
     Args:
         prior: the hypothesis before the update.
-        tree: the hypothesis as `update.update_tree` leaves it, before the correction of the mean.
+        tree: the hypothesis after `update.update_tree`, before the correction of the mean.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch with the variances of the bones as measurements; a, b, c, d and step are
-            overwritten.
+        work: work arrays with the bones' variances as measurements; `a`, `b`, `c`, `d` and `step`
+            are overwritten.
     """
     body = tree.body
     for j in range(len(body)):
@@ -113,33 +115,39 @@ def log_evidence(prior: Tree, tree: Tree, frame: Frame, settings: Settings, work
 
 @kernel
 def _log_likelihood_of_pixels(body: Floats, frame: Frame, inlier_odds: float) -> float:
-    """Return the log-likelihood of all pixels, relative to all being outliers.
+    """Return the log-likelihood of all pixels, relative to the case that all are outliers.
+
+    An inlier is Gaussian about the projected joint, an outlier is uniform in the image. The result
+    is the sum over joints and cameras of log(1 + odds exp(-|error|^2 / (2 sigma^2))), in which
+    odds = inlier_odds / sigma^2 are the odds of an inlier without error.
 
     Args:
-        body: (J, 6) positions and velocities.
-        frame: the measurements.
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        body: (J, 6) positions [m] and velocities [m/s] of the joints in the world frame.
+        frame: the measurements: `P` (C, 3, 4) projections, `z` (J, C, 2) pixels, `sigma` (J, C)
+            their standard deviations [px], `ok` (J, C) whether they exist.
+        inlier_odds: odds of an inlier, times the outliers' area in the image, over 2 pi [px^2].
     """
-    P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
+    projections, pixels, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
     for j in range(len(ok)):
-        for c in range(len(P)):
+        for c in range(len(projections)):
             if not ok[j, c]:
                 continue
-            u, v, depth = pixel_of(P[c], body[j, 0], body[j, 1], body[j, 2])
-            if depth > NEAREST_DEPTH_M:
-                near = 1.0 / (sigma[j, c] * sigma[j, c])
-                miss = (z[j, c, 0] - u) ** 2 + (z[j, c, 1] - v) ** 2
-                total += math.log1p(inlier_odds * near * math.exp(-0.5 * miss * near))
+            u, v, depth_m = pixel_of(projections[c], body[j, 0], body[j, 1], body[j, 2])
+            if depth_m > NEAREST_DEPTH_M:  # otherwise it counts as an outlier
+                precision = 1.0 / (sigma[j, c] * sigma[j, c])
+                squared_error = (pixels[j, c, 0] - u) ** 2 + (pixels[j, c, 1] - v) ** 2
+                odds = inlier_odds * precision
+                total += math.log1p(odds * math.exp(-0.5 * squared_error * precision))
     return total
 
 
 @kernel(makes_arrays=True)
 def measure_change(tree: Tree, change: Floats, work: Work) -> TreeMeasure:
-    """Return the length of a change (J, 6) under a tree, and the tree's determinant.
+    """Return the Mahalanobis length of a change (J, 6) under a tree, and the tree's determinant.
 
-    A conditional covariance that is not positive definite counts by its diagonal. The matrices a,
-    b, c and d of `work` are overwritten.
+    A conditional covariance that is not positive definite is replaced by its diagonal. The matrices
+    `a`, `b`, `c` and `d` of `work` are overwritten.
     """
     cov, slope, squared, log_det = tree.cov, tree.slope, 0.0, 0.0
     for j in ORDER:
@@ -163,12 +171,12 @@ def measure_change(tree: Tree, change: Floats, work: Work) -> TreeMeasure:
 
 @kernel
 def _measure_joint(a: Floats, x: Floats, factor: Floats) -> TreeMeasure:
-    """Return x' a^-1 x and log det a by Cholesky's factors.
+    """Return x' a^-1 x and log det a by Cholesky factorisation.
 
     Args:
         a: (6, 6) symmetric matrix.
         x: (6,) vector, overwritten.
-        factor: (6, 6) scratch.
+        factor: (6, 6) work array.
     """
     squared, product = 0.0, 1.0
     for i in range(6):
@@ -192,7 +200,7 @@ def _measure_joint(a: Floats, x: Floats, factor: Floats) -> TreeMeasure:
 
 @kernel
 def _measure_diagonal(a: Floats, x: Floats) -> TreeMeasure:
-    """Return the same for the diagonal of a (6, 6) alone."""
+    """Return x' d^-1 x and log det d for the diagonal d of a matrix `a` (6, 6)."""
     squared, log_det = 0.0, 0.0
     for i in range(6):
         variance = max(a[i, i], 1e-12)
@@ -208,7 +216,7 @@ def _log_likelihood_of_bones(body: Floats, length: Floats, variance: Floats) -> 
     Args:
         body: (J, 6) positions and velocities.
         length: (J,) lengths of the edges [m].
-        variance: (J,) their variances [m^2].
+        variance: (J,) variances of the lengths [m^2].
     """
     total = _log_likelihood_of_bone(body, _NOSE, _RIGHT_SHOULDER, length[_NOSE], variance[_NOSE])
     for j in ORDER[1:]:
@@ -218,14 +226,14 @@ def _log_likelihood_of_bones(body: Floats, length: Floats, variance: Floats) -> 
 
 @kernel
 def _log_likelihood_of_bone(body: Floats, j: int, q: int, length: float, variance: float) -> float:
-    """Return the log-likelihood of the distance between joints j and q."""
+    """Return the log-likelihood of the distance between joints `j` and `q`."""
     x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
     return -0.5 * (math.sqrt(x * x + y * y + z * z) - length) ** 2 / variance
 
 
 @kernel
 def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
-    """Return the log-likelihood of joints that are below the floor."""
+    """Return the log-likelihood of the heights of joints that are below the floor."""
     total = 0.0
     for j in range(len(body)):
         total -= 0.5 * (min(body[j, 2], 0.0) / std_m) ** 2
@@ -234,7 +242,7 @@ def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
 
 @kernel
 def distance_between(one: Tree, other: Tree, work: Work) -> float:
-    """Return the squared Mahalanobis distance of two trees under the wider of them."""
+    """Return the squared Mahalanobis distance between two trees under the wider of them."""
     least = np.inf
     for tree in (one, other):
         for j in range(len(one.body)):
@@ -246,7 +254,7 @@ def distance_between(one: Tree, other: Tree, work: Work) -> float:
 
 @kernel
 def score_pose(body: Floats) -> float:
-    """Return the log-potential of a pose (J, 3+): 0 at best, and where the heading is unknown."""
+    """Return the log-plausibility of a pose (J, 3+), at most 0; 0 if the heading is unknown."""
     heading = find_heading(body)
     total = 0.0
     if heading.is_known:
@@ -261,13 +269,13 @@ def score_pose(body: Floats) -> float:
 
 @kernel
 def find_heading(points: Floats) -> Heading:
-    """Return the heading of a body (J, 3+), from shoulders and hips."""
+    """Return the heading of a body (J, 3+) from its shoulders and hips."""
     return find_heading_from(points, True, True)
 
 
 @kernel
 def find_heading_from(points: Floats, has_shoulders: bool, has_hips: bool) -> Heading:
-    """Return the heading of a body from the shoulders or the hips.
+    """Return the heading of a body from its shoulders, its hips or both.
 
     Args:
         points: (J, 3+) positions [m].
@@ -287,12 +295,12 @@ def find_heading_from(points: Floats, has_shoulders: bool, has_hips: bool) -> He
 
 @kernel
 def weigh_pose(tree: Tree, has_rivals: bool, gain: float, settings: Settings) -> None:
-    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one.
+    """Update the weight of a hypothesis by its evidence and by the plausibility of its pose.
 
     Args:
         tree: the updated hypothesis, changed in place.
-        has_rivals: whether there are other hypotheses; the only one keeps its weight.
-        gain: log-evidence of the frame, times the trust in it.
+        has_rivals: whether there are other hypotheses; a single one keeps its weight.
+        gain: log-evidence of the frame, times `evidence_exponent`.
         settings: settings of the estimator.
     """
     pose_log_prior = settings.anatomy_exponent * score_pose(tree.body)
@@ -303,7 +311,7 @@ def weigh_pose(tree: Tree, has_rivals: bool, gain: float, settings: Settings) ->
 
 @kernel(makes_arrays=True)
 def prune_and_merge(worker: WorkerHypotheses, settings: Settings, work: Work) -> None:
-    """Drop hypotheses that are lost or too light, and merge those that have come close."""
+    """Drop hypotheses that are lost or have too little weight, and merge those that are close."""
     for h in range(worker.n_alive[0] - 1, -1, -1):
         if worker.n_alive[0] > 1 and not worker.trees[h].tracked:
             drop_hypothesis(worker, h)
@@ -314,7 +322,7 @@ def prune_and_merge(worker: WorkerHypotheses, settings: Settings, work: Work) ->
 
 @kernel(makes_arrays=True)
 def copy_slot(worker: WorkerHypotheses, source: int, target: int) -> None:
-    """Make slot `target` of a worker a copy of `source`."""
+    """Copy the hypothesis in slot `source` of a worker to slot `target`."""
     worker.trees[target] = worker.trees[source]
     worker.views[target] = worker.views[source]
     worker.noise[target] = worker.noise[source]
@@ -322,7 +330,7 @@ def copy_slot(worker: WorkerHypotheses, source: int, target: int) -> None:
 
 @kernel(makes_arrays=True)
 def exchange_slots(worker: WorkerHypotheses, one: int, other: int) -> None:
-    """Exchange two slots of a worker."""
+    """Swap the hypotheses in two slots of a worker."""
     tree = worker.trees[one : one + 1].copy()
     views, noise = worker.views[one].copy(), worker.noise[one].copy()
     copy_slot(worker, other, one)
@@ -332,7 +340,7 @@ def exchange_slots(worker: WorkerHypotheses, one: int, other: int) -> None:
 
 @kernel(makes_arrays=True)
 def drop_hypothesis(worker: WorkerHypotheses, h: int) -> None:
-    """Drop hypothesis h of a worker that has others; the last one takes its slot."""
+    """Drop hypothesis `h` of several about a worker; the last one takes its slot."""
     last = worker.n_alive[0] - 1
     if h != last:
         copy_slot(worker, last, h)
@@ -341,7 +349,7 @@ def drop_hypothesis(worker: WorkerHypotheses, h: int) -> None:
 
 @kernel(makes_arrays=True)
 def normalise_weights(worker: WorkerHypotheses, log_least: float) -> None:
-    """Drop hypotheses lighter than `log_least`; scale the weights to sum 1, heaviest first."""
+    """Drop hypotheses below `log_least`, normalise the weights, and put the heaviest first."""
     trees = worker.trees
     _scale_weights(trees, worker.n_alive[0])
     for h in range(worker.n_alive[0] - 1, -1, -1):
@@ -357,7 +365,7 @@ def normalise_weights(worker: WorkerHypotheses, log_least: float) -> None:
 
 @kernel
 def _scale_weights(trees: Records1[Tree], n: int) -> None:
-    """Make the weights of the first n trees sum to 1."""
+    """Normalise the weights of the first `n` trees to the sum 1."""
     most, total = -np.inf, 0.0
     for h in range(n):
         most = max(most, trees[h].log_weight)
@@ -369,12 +377,12 @@ def _scale_weights(trees: Records1[Tree], n: int) -> None:
 
 @kernel(makes_arrays=True)
 def merge_close(worker: WorkerHypotheses, least_distance: float, work: Work) -> None:
-    """Merge hypotheses that have come close: the heavier stays, with the weight of both.
+    """Merge hypotheses that are close: the heavier one remains, with the sum of the weights.
 
     Args:
-        worker: the hypotheses of one worker, changed in place.
-        least_distance: squared Mahalanobis distance from which two are kept apart.
-        work: scratch.
+        worker: the hypotheses about one worker, changed in place.
+        least_distance: squared Mahalanobis distance below which two hypotheses are merged.
+        work: work arrays.
     """
     trees, h = worker.trees, 0
     while h < worker.n_alive[0]:

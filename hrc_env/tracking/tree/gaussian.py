@@ -1,12 +1,12 @@
-"""A Gaussian on the kinematic tree: which joint hangs on which, and algebra of its blocks.
+"""Gaussian on the kinematic tree: parents of the joints, and algebra of 6x6 and 3x3 blocks.
 
-Each joint's state x_j is its position [m] and velocity [m/s] in the world, 6 numbers. The
-joint distribution of all 90 is kept as marginal covariances C_j (6, 6) and, for every joint but
-the root, the slope B_j (6, 6) with which it follows its parent q:
+Each joint's state x_j consists of its position [m] and velocity [m/s] in the world frame, 6
+numbers. The distribution of all 90 numbers is stored as marginal covariances C_j (6, 6) and, for
+every joint except the root, the slope B_j (6, 6) on its parent q:
 
     x_j - E x_j = B_j (x_q - E x_q) + independent noise,   Cov(x_j, x_q) = B_j C_q.
 
-This is exact; a joint depends on all others through its parent only.
+This representation is exact if each joint depends on the joints above it only through its parent.
 """
 
 from typing import NamedTuple
@@ -16,12 +16,12 @@ from hrc_env.core.skeleton import BONES, N_JOINTS
 from hrc_env.core.typing import Floats, Vector3
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
-"""Parent of each joint; -1 for the root. The nose, the right shoulder and the left half hang on
-the left shoulder."""
+"""Parent of each joint; -1 for the root. The left shoulder is the parent of the nose, the right
+shoulder, the left elbow and the left hip."""
 ORDER = (1, 0, 2, 7, 8, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14)
-"""Joints with every parent before its children."""
+"""Joints in an order in which parents precede their children."""
 LEAVES_FIRST = ORDER[::-1]
-"""Joints with every parent after its children."""
+"""Joints in an order in which children precede their parents."""
 ROOT = ORDER[0]
 """The joint without a parent, the left shoulder."""
 _ends = [tuple(sorted(int(end) for end in ends)) for ends in BONES]
@@ -29,10 +29,10 @@ EDGE_BONE = tuple(
     _ends.index((min(j, PARENT[j]), max(j, PARENT[j]))) if j != ROOT else -1
     for j in range(N_JOINTS)
 )
-"""Row of `skeleton.BONES` that joins a joint to its parent; -1 for the root."""
+"""Row of `skeleton.BONES` with the bone from each joint to its parent; -1 for the root."""
 _LEAST_PIVOT = 1e-13
-"""Pivot below which a matrix counts as singular."""
-_REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
+"""Pivot below which a matrix is considered singular."""
+_REORDER = {"reassoc", "contract", "nsz"}  # for vectorised sums; NaN and infinity remain valid
 
 
 class Row6(NamedTuple):
@@ -53,7 +53,7 @@ class Row6(NamedTuple):
 
 
 class Inverse3(NamedTuple):
-    """The inverse of a symmetric 3x3 matrix: its lower triangle, and whether it can be used."""
+    """Lower triangle of the inverse of a symmetric 3x3 matrix, and whether the inverse is valid."""
 
     a00: float
     """Entry 00."""
@@ -77,20 +77,20 @@ class Blocks(NamedTuple):
     upper: Inverse3
     """Inverse of the upper block, U^-1."""
     x: Vector3
-    """U^-1 times row 0 of L: slope of coordinate 3 on the upper half."""
+    """U^-1 times row 0 of L, which is the slope of coordinate 3 on the first three."""
     y: Vector3
-    """U^-1 times row 1 of L: slope of coordinate 4 on the upper half."""
+    """U^-1 times row 1 of L, which is the slope of coordinate 4 on the first three."""
     z: Vector3
-    """U^-1 times row 2 of L: slope of coordinate 5 on the upper half."""
+    """U^-1 times row 2 of L, which is the slope of coordinate 5 on the first three."""
     lower: Inverse3
-    """Inverse of the lower block given the upper, (D - L U^-1 L')^-1."""
+    """Inverse of the Schur complement of the upper block, (D - L U^-1 L')^-1."""
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def _combine_rows(
     a0: float, a1: float, a2: float, a3: float, a4: float, a5: float, b: Floats
 ) -> Row6:
-    """Return the sum of the rows of b (6, 6), row i times ai."""
+    """Return the sum of the rows of `b` (6, 6), weighted by `a0` to `a5`."""
     return Row6(
         a0 * b[0, 0] + a1 * b[1, 0] + a2 * b[2, 0] + a3 * b[3, 0] + a4 * b[4, 0] + a5 * b[5, 0],
         a0 * b[0, 1] + a1 * b[1, 1] + a2 * b[2, 1] + a3 * b[3, 1] + a4 * b[4, 1] + a5 * b[5, 1],
@@ -103,7 +103,7 @@ def _combine_rows(
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the product a b of 6x6 matrices; `out` may be `a`, since rows are written whole."""
+    """Compute the product a b of 6x6 matrices in `out`, which may be `a`."""
     for i in range(6):
         row = _combine_rows(a[i, 0], a[i, 1], a[i, 2], a[i, 3], a[i, 4], a[i, 5], b)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = row
@@ -111,7 +111,7 @@ def multiply(a: Floats, b: Floats, out: Floats) -> None:
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def transposed_multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the product a' b of 6x6 matrices."""
+    """Compute the product a' b of 6x6 matrices in `out`."""
     for i in range(6):
         row = _combine_rows(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], b)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = row
@@ -119,7 +119,7 @@ def transposed_multiply(a: Floats, b: Floats, out: Floats) -> None:
 
 @kernel(fastmath=_REORDER)
 def multiply_transposed(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the product a b' of 6x6 matrices."""
+    """Compute the product a b' of 6x6 matrices in `out`."""
     for k in range(6):
         b0, b1, b2, b3, b4, b5 = b[k, 0], b[k, 1], b[k, 2], b[k, 3], b[k, 4], b[k, 5]
         for i in range(6):
@@ -129,9 +129,9 @@ def multiply_transposed(a: Floats, b: Floats, out: Floats) -> None:
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def invert_half(a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> Inverse3:
-    """Return the inverse of a symmetric 3x3 matrix by its L D L' factors.
+    """Return the inverse of a symmetric 3x3 matrix from its L D L' factors.
 
-    Unlike cofactors it loses no digits where a matrix is nearly singular.
+    Unlike the cofactor formula, it loses no digits if the matrix is nearly singular.
 
     Args:
         a00: element (0, 0) of the lower triangle.
@@ -158,7 +158,7 @@ def invert_half(a00: float, a10: float, a11: float, a20: float, a21: float, a22:
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def invert3(a: Floats, out: Floats) -> None:
-    """Write the inverse of a symmetric 3x3 matrix, of which the lower triangle is read."""
+    """Compute the inverse of a symmetric 3x3 matrix in `out`; only its lower triangle is read."""
     half = invert_half(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
     out[0, 0], out[1, 1], out[2, 2] = half.a00, half.a11, half.a22
     out[1, 0] = out[0, 1] = half.a10
@@ -178,7 +178,7 @@ def _apply(half: Inverse3, x: float, y: float, z: float) -> Vector3:
 
 @kernel(fastmath=_REORDER, forceinline=True)
 def _factor(a: Floats) -> Blocks:
-    """Return the factors of a symmetric 6x6 matrix, of which the lower triangle is read."""
+    """Return the factors of a symmetric 6x6 matrix; only its lower triangle is read."""
     upper = invert_half(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
     x = _apply(upper, a[3, 0], a[3, 1], a[3, 2])
     y = _apply(upper, a[4, 0], a[4, 1], a[4, 2])
@@ -196,14 +196,17 @@ def _factor(a: Floats) -> Blocks:
 
 @kernel(fastmath=_REORDER)
 def is_positive_definite(a: Floats) -> bool:
-    """Return whether a symmetric 6x6 matrix, of which the lower triangle is read, is positive."""
+    """Return whether a symmetric 6x6 matrix is positive definite; its lower triangle is read."""
     blocks = _factor(a)
     return blocks.upper.is_positive and blocks.lower.is_positive
 
 
 @kernel(fastmath=_REORDER)
 def invert(a: Floats, out: Floats) -> bool:
-    """Write the inverse of a symmetric 6x6 matrix; return whether it is positive definite."""
+    """Compute the inverse of a symmetric 6x6 matrix in `out`; return whether it is valid.
+
+    It is valid if the matrix is positive definite.
+    """
     blocks = _factor(a)
     p, x, y, z, v = blocks.upper, blocks.x, blocks.y, blocks.z, blocks.lower
     for k in range(3):

@@ -1,20 +1,20 @@
-"""Learning: true noise and lengths of bones, which a hypothesis keeps from frame to frame.
+"""Learning of the measurement noise and of bone lengths by each hypothesis.
 
-True errors of a detector may be larger or smaller than it reports, and they may persist for about
-half a second. Per worker and camera a factor on the reported variance is learnt with which a
-filter for white noise is honest (docs/tracking.md, "Measurement noise"):
+The errors of a detector may be larger or smaller than it reports, and they may persist for about
+half a second. For each joint and camera, a factor on the reported variance is learnt with which a
+filter for white noise has consistent covariances (docs/tracking.md, "Measurement noise"):
 
 factor = V (1 - L + L (1 + a r) / (1 - a r)).
 
-V is true over reported variance: each joint is triangulated from this frame alone, without the
-prediction, in which a camera's persistent error is already believed; the square of a camera's
-residual is divided by how much of it the point could not absorb, its redundancy (Foerstner,
-Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the variance that persists, from
-the products of these residuals with those of the update before; r the correlation of that part
-over one update; a the weight of the prediction in the estimate, the mean over joints of
-tr(posterior covariance, predicted covariance^-1) / 3.
+V is the ratio of true to reported variance. To estimate it, each joint is triangulated from the
+present frame alone, because the prediction already includes a camera's persistent error. The square
+of a camera's residual is divided by its redundancy, the share that the triangulated point does not
+absorb (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the variance that
+persists, from the products of these residuals with those of the previous update; r is the
+correlation of the persistent part over one update; a is the weight of the prediction in the
+estimate of the joint, tr(posterior covariance, predicted covariance^-1) / 3.
 
-The length of each bone has a scalar Kalman filter, which learns while two views see both ends.
+Each bone length has a scalar Kalman filter, which learns while two views see both ends.
 """
 
 import math
@@ -42,48 +42,48 @@ from hrc_env.tracking.tree.state import (
 )
 
 _TURNS = 2
-"""Turns in which the joints are learnt from, one each update: neighbouring frames are alike, so
-that this costs less and teaches as much."""
+"""Number of groups of joints, of which one is used in each update. Successive frames are similar;
+therefore this saves time without loss of information."""
 _CAMERA_WEIGHT = 50.0
-"""Redundancy that the reported noise counts as, so that the first frames decide little."""
+"""Weight of the reported noise as a prior for the camera's noise, in units of redundancy."""
 _JOINT_WEIGHT = 100.0
-"""Redundancy of each joint that its camera's noise counts as."""
+"""Weight of the camera's noise as a prior for the noise of each joint, in units of redundancy."""
 _SHARE_WEIGHT = 600.0
-"""Squared residuals that the assumed share of persistent variance counts as: with two views alone
-the true one shows late."""
+"""Weight of the assumed share of persistent variance as a prior, in squared residuals. It is large
+because two views alone reveal the true share late."""
 _CHANCE = 0.07
-"""Twice the standard deviation of the estimated share where no error persists."""
+"""Twice the standard deviation of the estimated share if no error persists."""
 _CORRELATED_UPDATES = 10.0
-"""Updates for which errors of a bone's length last."""
+"""Number of updates for which errors of a bone's length persist."""
 _GATE_SIGMA = 3.0
-"""Standard deviations beyond which a measurement of a bone's length is ignored."""
+"""Number of standard deviations beyond which a measurement of a bone's length is ignored."""
 _LEAST_VARIANCE = 1e-5
-"""Least variance of a bone's length [m^2]."""
+"""Minimum variance of a bone's length [m^2]."""
 _OPEN_M = 0.5
-"""Standard deviation of a joint about its mean in the triangulation [m]: two views leave the
-place along a ray that they share open."""
+"""Standard deviation of a joint about its mean in the triangulation [m]. It regularises positions
+along a ray that two views share."""
 _LEAST_BELIEF = 0.5
-"""Weight below which a measurement is not learnt from."""
+"""Inlier probability up to which a measurement is not used for learning."""
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
 class NoiseModel(NamedTuple):
-    """The constants for learning the factors on the reported variances."""
+    """Constants for learning the factors on the reported variances."""
 
     keep: float
-    """Share of a joint's statistics that its next turn leaves."""
+    """Share of a joint's statistics that is kept when the joint is used again."""
     correlation: float
-    """Correlation r over one update of errors that persist."""
+    """Correlation r of persistent errors over one update."""
     share: float
-    """Assumed share L of the variance that persists."""
+    """Prior share L of the variance that persists."""
     min_factor: float
     """Lower bound of the factors."""
     max_factor: float
-    """Upper bound of the factors; equal to the lower one if nothing is learnt."""
+    """Upper bound of the factors; equal to the lower bound if nothing is learnt."""
 
 
 def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
-    """Return the constants for updates that are `ctrl_dt` [s] apart."""
+    """Return the constants for updates every `ctrl_dt` [s]."""
     min_factor, max_factor = config.noise_bounds
     keep, correlation = (
         math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_correlation_s)
@@ -95,14 +95,14 @@ def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
 def learn_from_frame(
     frame: Frame, tree: Tree, noise: Records2[Noise], model: NoiseModel, work: Work
 ) -> None:
-    """Learn lengths of bones and factors on the noise from an updated hypothesis.
+    """Learn bone lengths and factors on the variances from an updated hypothesis.
 
     Args:
-        frame: the measurements, with `sigma` as `measurements.scale_sigma` leaves it.
+        frame: the measurements, with `sigma` after `measurements.scale_sigma`.
         tree: the hypothesis; its lengths are changed in place.
-        noise: (J, C) its measurement noise, changed in place.
+        noise: (J, C) measurement noise of the hypothesis, changed in place.
         model: constants for learning the factors.
-        work: scratch with `n_views` and with `predicted`, the covariances before the update.
+        work: work arrays with `n_views` and with `predicted`, the covariances before the update.
     """
     learn_lengths(tree, work.n_views)
     if model.min_factor == model.max_factor:
@@ -129,18 +129,19 @@ def learn_from_frame(
 
 @kernel(fastmath=_REORDER)
 def _triangulate(frame: Frame, body: Floats, j: int, view: Floats, spread: Floats) -> int:
-    """Triangulate a joint from this frame alone, linearly about its mean.
+    """Triangulate a joint from one set of frames alone, linearised about its mean.
 
     Args:
-        frame: the measurements, of which those with enough weight count.
+        frame: the measurements; only probable inliers are used.
         body: (6,) mean of the joint.
-        j: the joint.
-        view: (C, 8) receives the rows of `_linearise`; infinity as the first residual of a camera
-            that does not count.
-        spread: (3, 4) receives the point's covariance [m^2] and its offset from the mean [m].
+        j: index of the joint.
+        view: (C, 8) rows of `_linearise`, filled in; the first residual of an unused camera is
+            infinite.
+        spread: (3, 4) covariance of the point [m^2] and, in the last column, its offset from the
+            mean [m]; filled in.
 
     Returns:
-        The number of cameras that count.
+        The number of cameras that are used.
     """
     h00 = h11 = h22 = 1.0 / _OPEN_M**2
     h01 = h02 = h12 = g0 = g1 = g2 = 0.0
@@ -175,14 +176,14 @@ def _triangulate(frame: Frame, body: Floats, j: int, view: Floats, spread: Float
 
 @kernel(fastmath=_REORDER)
 def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats) -> bool:
-    """Write the Jacobians and the residuals of a joint's pixel, over its standard deviation.
+    """Compute the Jacobians and the residuals of a joint's pixel, over its standard deviation.
 
     Args:
         p: (3, 4) projection.
         body: (3+,) position of the joint [m].
         pixel: (2,) measurement [px].
-        sigma: its standard deviation [px].
-        out: (8,) receives the Jacobian of u (3) and of v (3) [1/m] and the two residuals.
+        sigma: standard deviation of the measurement [px].
+        out: (8,) Jacobians of u (3) and of v (3) [1/m] and the two residuals, filled in.
 
     Returns:
         Whether the joint is in front of the camera.
@@ -191,7 +192,7 @@ def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
     if not depth > NEAREST_DEPTH_M:
         return False
-    near = 1.0 / (depth * sigma)  # over sigma; the only division
+    near = 1.0 / (depth * sigma)  # divided by sigma; the only division
     nearer, inverse = near * sigma, near * depth
     u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) * nearer
     v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) * nearer
@@ -205,12 +206,12 @@ def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats
 def _add_residuals(view: Floats, spread: Floats, noise: Records1[Noise], model: NoiseModel) -> None:
     """Add one joint's residuals about its triangulated point to the statistics of its noise.
 
-    Of the last residuals a part is left, faded as errors that persist fade: products with them
-    over their squares estimate the same share after any time.
+    The previous residuals decay like persistent errors. Therefore the ratio of products with them
+    to their squares estimates the same share after any time.
 
     Args:
-        view: (C, 8) as `_triangulate` writes it.
-        spread: (3, 4) likewise.
+        view: (C, 8) rows of the cameras, from `_triangulate`.
+        spread: (3, 4) covariance and offset of the point, from `_triangulate`.
         noise: (C,) the joint's noise in each camera, changed in place.
         model: constants for learning the factors.
     """
@@ -244,8 +245,8 @@ def _find_prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> flo
 
     Args:
         cov: (3+, 3+) covariance after the update [m^2].
-        predicted: (3, 3) covariance before it [m^2].
-        work: (3, 3+) scratch.
+        predicted: (3, 3) covariance before the update [m^2].
+        work: (3, 3+) work array.
     """
     inverse3(predicted, work)
     own = cov[0, 0] * work[0, 0] + cov[1, 1] * work[1, 1] + cov[2, 2] * work[2, 2]
@@ -255,12 +256,12 @@ def _find_prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> flo
 
 @kernel(fastmath=_REORDER)
 def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel) -> None:
-    """Write the factors that follow from the statistics.
+    """Compute the factors on the variances from the statistics.
 
     Args:
         noise: (J, C) the noise, changed in place.
-        persistence: (J,) last bracket of the module's formula; the factors of a joint stay where
-            it is negative.
+        persistence: (J,) (1 + a r) / (1 - a r) of the module's formula; if it is negative, the
+            factors of the joint do not change.
         model: constants for learning the factors.
     """
     for c in range(noise.shape[1]):
@@ -284,10 +285,10 @@ def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel)
 
 @kernel
 def learn_lengths(tree: Tree, n_views: Ints) -> None:
-    """Learn a hypothesis's bone lengths where two cameras measured both ends.
+    """Learn a hypothesis's lengths of bones with both ends measured by two cameras.
 
-    Each length has a Kalman filter with a measurement noise that is larger by the number of updates
-    for which errors last.
+    Each length has a Kalman filter, whose measurement noise is multiplied by the number of updates
+    for which errors persist.
 
     Args:
         tree: the updated hypothesis, changed in place.
@@ -311,7 +312,7 @@ def learn_lengths(tree: Tree, n_views: Ints) -> None:
                 difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
-        measured = apart - 0.5 * (total - spread) / apart  # errors across a bone lengthen it
+        measured = apart - 0.5 * (total - spread) / apart  # lateral errors bias the length
         noise = _CORRELATED_UPDATES * max(spread, EDGE_STIFFNESS_M[j] ** 2)
         miss = measured - length[j]
         if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):

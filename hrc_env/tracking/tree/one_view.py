@@ -1,7 +1,8 @@
-"""A track that one view alone begins: a standing body of usual size is fitted, turned every way.
+"""Tracks started from one view, by fitting a standing body of average size in several headings.
 
-The size gives the depth: the body may be farther and larger by a share that is kept beside the
-Gaussian (`Tree.size_std`) and reported with it, until two views agree.
+The assumed size determines the depth. The uncertainty of the size, by which the body may be larger
+and farther, is stored separately from the Gaussian (`Tree.size_std`) and included in the reported
+covariance until two views agree.
 """
 
 import math
@@ -24,23 +25,23 @@ from hrc_env.tracking.tree.state import STANDING_M, Tree, Work, WorkerHypotheses
 from hrc_env.tracking.tree.update import correct_mean, update_tree
 
 _N_TURNS = 8
-"""Headings that are tried."""
+"""Number of headings that are tried."""
 _SEARCH_STEPS = 6
-"""Gauss-Newton steps from each of them."""
+"""Number of Gauss-Newton steps from each heading."""
 _LEAST_EVIDENCE = 2.0
-"""Least evidence for a body, a joint that the view has found [nat]: people have 4 and more, points
-anywhere in a box as large as a body hardly ever as much."""
+"""Minimum evidence for a body per detected joint [nat]. People have at least 4; random points in a
+box as large as a body rarely reach this value."""
 _POSE_STD_M = 0.2
-"""Standard deviation of a joint's place relative to its parent's before the search [m]; like the
-next three a judgement, wide enough for bodies that bend and walk."""
+"""Standard deviation of a joint's position relative to its parent before the search [m]. Like the
+next three values, it is an estimate, wide enough for bodies that bend and walk."""
 _ROOT_STD_M = 0.3
-"""Standard deviation of the root's place on each axis [m]."""
+"""Standard deviation of the root's position on each axis [m]."""
 _ROOT_SPEED_STD_M_S = 1.0
 """Standard deviation of the root's speed on each axis [m/s]."""
 _DEPTH_SHARE = 0.3
 """Relative standard deviation of the root's depth."""
 _UNSEEN_UPDATES = 100
-"""Updates for which the other cameras count as not having seen the worker."""
+"""Number of updates for which the other cameras are assumed not to have seen the worker."""
 
 
 @kernel(makes_arrays=True)
@@ -51,14 +52,14 @@ def start_from_one_view(
     work: Work,
     prior: Records1[Tree],
 ) -> None:
-    """Begin a track from one view where no second one has come for a while.
+    """Start a track from one view if there was no second view for `one_view_wait_updates`.
 
     Args:
-        worker: the hypotheses of a worker without a track, changed in place.
+        worker: the hypotheses about a worker without a track, changed in place.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch.
-        prior: (1,) scratch.
+        work: work arrays.
+        prior: (1,) work array for a hypothesis before its update.
     """
     tree, cameras = worker.trees[0], np.zeros(2, np.int64)
     n_views, n = count_views(frame, settings.acquire_min_joints, cameras), tree.one_view_updates
@@ -78,15 +79,15 @@ def fit_to_one_view(
     work: Work,
     prior: Records1[Tree],
 ) -> None:
-    """Begin a track with the body that explains one camera best, if any explains it.
+    """Start a track with the body that explains one view best, if its evidence suffices.
 
     Args:
-        worker: the hypotheses of a worker without a track, changed in place.
+        worker: the hypotheses about a worker without a track, changed in place.
         camera: index of the camera.
         frame: the measurements.
         settings: settings of the estimator.
-        work: scratch.
-        prior: (1,) scratch.
+        work: work arrays.
+        prior: (1,) work array for a hypothesis before its update.
     """
     tree, best = worker.trees[0], worker.trees[:1].copy()
     most = least = _LEAST_EVIDENCE * frame.ok[:, camera].sum()
@@ -114,21 +115,21 @@ def fit_to_one_view(
 
 @kernel(makes_arrays=True)
 def _stand_body(tree: Tree, frame: Frame, camera: int, angle: float) -> bool:
-    """Predict a standing body where its joints fit the pixels of one camera best.
+    """Set a tree to a standing body at the position that fits the pixels of one camera best.
 
     Args:
-        tree: receives the Gaussian.
+        tree: the hypothesis, of which the Gaussian is filled in.
         frame: the measurements.
         camera: index of the camera.
         angle: heading of the body [rad].
 
     Returns:
-        Whether it can be in view.
+        Whether there is such a position.
     """
     P, cos, sin = frame.P[camera], math.cos(angle), math.sin(angle)
     views, place = np.empty((len(STANDING_M), 3, 4)), np.empty(3)
     tree.body[:], tree.cov[:], tree.slope[:] = 0.0, 0.0, 0.0
-    for j in range(len(views)):  # every joint is a view of the middle of the body
+    for j in range(len(views)):  # every joint is a view of the centre of the body
         forward, left, up = STANDING_M[j]
         x, y = cos * forward - sin * left, sin * forward + cos * left
         tree.body[j, 0], tree.body[j, 1], tree.body[j, 2], views[j] = x, y, up, P
@@ -154,10 +155,10 @@ def _stand_body(tree: Tree, frame: Frame, camera: int, angle: float) -> bool:
 
 @kernel(makes_arrays=True)
 def _measure_size(tree: Tree, eye: Floats, settings: Settings) -> None:
-    """Scale a body about the camera so that its lowest joint comes nearer to the floor.
+    """Scale a body about the camera so that its lowest joint comes closer to the floor.
 
     Args:
-        tree: the body, changed in place with its lengths, offsets and uncertain size.
+        tree: the hypothesis, of which body, lengths, offsets and `size_std` are changed in place.
         eye: (3,) optical centre of the camera [m].
         settings: settings of the estimator.
     """

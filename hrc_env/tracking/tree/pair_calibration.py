@@ -1,15 +1,15 @@
-"""Pair calibration: the turns of two cameras by which their lines of sight meet.
+"""Estimation of the rotations of two cameras with which their lines of sight meet.
 
-One of two cameras that alone see a worker may be turned against its calibration. Two lines of
-sight with unit directions d_a, d_b from e_a, e_b, nearest to each other at distances r_a, r_b, pass
-each other at g = n . (e_b - e_a), n = d_a x d_b / |d_a x d_b|. Small turns w_a, w_b of the cameras
-about their centres change that to
+If only two cameras see a worker, one of them may be rotated relative to its calibration. Two lines
+of sight with unit directions d_a, d_b from e_a, e_b, which are closest to each other at the
+distances r_a, r_b, have the gap g = n . (e_b - e_a) with n = d_a x d_b / |d_a x d_b|. Small
+rotations w_a, w_b of the cameras about their centres change the gap to
 
-    g + r_b (d_b x n) . w_b - r_a (d_a x n) . w_a,
+    g + r_b (d_b x n) . w_b - r_a (d_a x n) . w_a.
 
-which every joint of a body measures to be 0. The turns are a Gaussian of 6 numbers that begins at
-no turn and forgets within seconds. The displacement of the body as a whole that it leaves open is
-added to the reported covariance.
+Every joint of a body is a measurement that this gap is 0. The rotations are a Gaussian of 6
+numbers that starts at zero and forgets within seconds. The remaining uncertainty of a displacement
+of the whole body is added to the reported covariance.
 """
 
 import math
@@ -28,43 +28,48 @@ from hrc_env.tracking.tree.gaussian import invert, multiply, multiply_transposed
 from hrc_env.tracking.tree.state import Pair, Tree, WorkerHypotheses
 
 TURN_STD_RAD = 0.05
-"""Standard deviation of a camera's turn about each axis [rad]: a judgement about a camera that was
-knocked."""
+"""Prior standard deviation of a camera's rotation about each axis [rad], an estimate for a camera
+that was knocked."""
 _LEAST_TURN_RAD = 0.014
-"""Turn of both cameras together from which they count as misaligned [rad]; half of it keeps them
-so."""
+"""Combined rotation of both cameras above which they become misaligned [rad]; half of it suffices
+for them to remain so."""
 _LEAST_EVIDENCE = 16.0
-"""Twice the log-likelihood that the turns must explain for that; half of it keeps them so."""
+"""Twice the log-likelihood that the rotations must explain before cameras become misaligned; half
+of it suffices for them to remain so."""
 _MOST_TURN_RAD = 0.14
-"""Turn above which the lines of sight are those of different people [rad]."""
+"""Combined rotation from which the lines of sight are assumed to belong to different people
+[rad]."""
 _MEETING = 3.0
 """Median squared gap, in variances, below which the lines of sight of a body meet."""
 _FORGETS = 0.1
-"""Share of `Pair.meeting_share` that one update replaces."""
+"""Weight of one update in `Pair.meeting_share`."""
 _LEAST_SHARE = 0.5
-"""Share of the last updates in which lines must meet for cameras to count as misaligned."""
+"""Value of `Pair.meeting_share` above which cameras may become misaligned."""
 _LEAST_SHARE_MISALIGNED = 0.3
-"""Share that keeps them so; the share before the first update."""
+"""Value of `Pair.meeting_share` above which cameras may remain misaligned; also its initial
+value."""
 _KEPT = 0.99
-"""Share of the information that an update leaves."""
+"""Share of the information that is kept in an update."""
 _WEIGHT = 1 / 12
-"""Weight of an update: errors of a detector last for about twelve."""
+"""Weight of an update, because errors of a detector persist for about twelve updates."""
 _PASSING_M = 0.03
-"""Standard deviation of the gap between two lines of sight for other reasons than noise [m]."""
+"""Standard deviation of the gap between two lines of sight apart from pixel noise [m]."""
 _TAIL = 4.0
-"""Squared gap, in medians, that has half its weight."""
+"""Squared gap with half its weight, relative to the median."""
 
 
 @kernel(makes_arrays=True)
 def check_pair_calibration(worker: WorkerHypotheses, frame: Frame, settings: Settings) -> None:
-    """Check whether two cameras that alone see a worker are misaligned; if so, start over.
+    """Check whether the only two cameras that see a worker are misaligned, and restart tracks.
 
-    Where a third camera sees the worker, the two are taken as calibrated: a detector's errors of
-    one kind look like a turn before long.
+    A track is restarted whenever the cameras become misaligned or are found to be calibrated.
+
+    If a third camera sees the worker, the two are considered calibrated, because persistent errors
+    of the detector eventually resemble a rotation.
 
     Args:
-        worker: the hypotheses of one worker, changed in place.
-        frame: the measurements; its projections are set to those of the turned cameras.
+        worker: the hypotheses about one worker, changed in place.
+        frame: the measurements; its projections are set to those of the rotated cameras.
         settings: settings of the estimator.
     """
     tree, cameras = worker.trees[0], np.zeros(2, np.int64)
@@ -93,13 +98,13 @@ def check_pair_calibration(worker: WorkerHypotheses, frame: Frame, settings: Set
 
 @kernel(makes_arrays=True)
 def _may_start_turned(tree: Tree, cameras: Records1[Camera], settings: Settings) -> bool:
-    """Return whether a track may begin with two cameras turned.
+    """Return whether a track may start with two rotated cameras.
 
-    Where turned cameras leave open where a body is, as nearly opposite ones do, a present track
-    stays.
+    An existing track is kept if the rotations leave the position of the body too uncertain, as
+    those of almost opposite cameras do.
 
     Args:
-        tree: the worker's heaviest hypothesis; its displacement is overwritten.
+        tree: the worker's heaviest hypothesis; its `displaced_m2` is overwritten.
         cameras: (C,) cameras of the rig.
         settings: settings of the estimator.
     """
@@ -113,7 +118,7 @@ def _may_start_turned(tree: Tree, cameras: Records1[Camera], settings: Settings)
 def count_views(frame: Frame, least_joints: int, cameras: Ints) -> int:
     """Return the number of cameras that measured at least `least_joints` joints.
 
-    The last two of them are written to `cameras` (2,).
+    The indices of the last two of them are written to `cameras` (2,).
     """
     n = 0
     for c in range(len(frame.P)):
@@ -128,7 +133,7 @@ def count_views(frame: Frame, least_joints: int, cameras: Ints) -> int:
 
 @kernel(makes_arrays=True)
 def _update_turns(tree: Tree, cameras: Ints, frame: Frame, least_joints: int) -> None:
-    """Learn the turns of two cameras from the gaps between their lines of sight.
+    """Learn the rotations of two cameras from the gaps between their lines of sight.
 
     Args:
         tree: the worker's heaviest hypothesis; its `pair` is changed in place.
@@ -172,7 +177,7 @@ def _update_turns(tree: Tree, cameras: Ints, frame: Frame, least_joints: int) ->
 
 @kernel(makes_arrays=True)
 def _forget_turns(pair: Pair) -> None:
-    """Put a pair back to cameras of which nothing was measured."""
+    """Reset a pair to its state before any measurement."""
     pair.information[:], pair.score[:], pair.turn[:] = 0.0, 0.0, 0.0
     pair.meeting_share, pair.is_misaligned = _LEAST_SHARE_MISALIGNED, False
     pair.untracked_updates = 0
@@ -180,7 +185,7 @@ def _forget_turns(pair: Pair) -> None:
 
 @kernel
 def _has_turned(pair: Pair) -> bool:
-    """Return whether two cameras show that they are turned."""
+    """Return whether the learnt rotations of two cameras are large and certain enough."""
     squared, evidence = 0.0, 0.0
     for i in range(6):
         squared += pair.turn[i] ** 2
@@ -195,20 +200,20 @@ def _has_turned(pair: Pair) -> bool:
 
 @kernel(makes_arrays=True)
 def measure_gaps(tree: Tree, frame: Frame, rows: Floats, gap: Floats, variance: Floats) -> int:
-    """Measure the gaps between two cameras' lines of sight, for the present turns.
+    """Measure the gaps between two cameras' lines of sight with the current rotations.
 
-    Slopes are those at the tracked body: at the lines themselves they would share the gaps' noise,
-    which adds up to a turn.
+    Slopes are evaluated at the tracked body. If they were evaluated at the measured lines, they
+    would correlate with the noise of the gaps, which would bias the rotations.
 
     Args:
         tree: the worker's heaviest hypothesis, with the pair of cameras.
         frame: the measurements.
-        rows: (J, 6) receives the slopes of the gaps on the turns [m/rad].
-        gap: (J,) receives the gaps [m].
-        variance: (J,) receives their variances [m^2].
+        rows: (J, 6) derivatives of the gaps with respect to the rotations [m/rad], filled in.
+        gap: (J,) gaps [m], filled in.
+        variance: (J,) variances of the gaps [m^2], filled in.
 
     Returns:
-        The number of joints that both cameras measured; as many rows are written.
+        The number of joints that both cameras measured, which is the number of filled rows.
     """
     pair, n = tree.pair, 0
     a, b = pair.cameras[0], pair.cameras[1]
@@ -245,7 +250,7 @@ def measure_gaps(tree: Tree, frame: Frame, rows: Floats, gap: Floats, variance: 
 
 @kernel
 def _write_normal(one: Floats, other: Floats, out: Floats) -> None:
-    """Write the unit normal (3,) of two lines."""
+    """Compute the unit normal (3,) of two directions in `out`."""
     cross(one, other, out)
     length = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
     for i in range(3):
@@ -254,7 +259,7 @@ def _write_normal(one: Floats, other: Floats, out: Floats) -> None:
 
 @kernel
 def cross(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the cross product of two vectors (3,); `out` may be one of them."""
+    """Compute the cross product of two vectors (3,) in `out`, which may be one of them."""
     x, y = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
     out[0], out[1] = x, y
@@ -262,7 +267,7 @@ def cross(a: Floats, b: Floats, out: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def turn_camera(camera: Camera, turn: Floats, out: Floats) -> None:
-    """Write the projection (3, 4) of a camera turned about its centre by a rotation vector (3,)."""
+    """Compute the projection (3, 4) of a camera rotated about its centre by a rotation vector."""
     P, angle, first, second = camera.P, 1e-12, np.empty(3), np.empty(3)
     for i in range(3):
         angle += turn[i] ** 2
@@ -279,16 +284,16 @@ def turn_camera(camera: Camera, turn: Floats, out: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def measure_displacement(pair: Pair, cameras: Records1[Camera], body: Floats, out: Floats) -> None:
-    """Write the covariance of a body's displacement that the cameras' uncertain turns leave.
+    """Compute the covariance of a body's displacement due to the cameras' uncertain rotations.
 
-    The point that two cameras triangulate follows their turns w_c with the slope
-    (sum M_c)^-1 M_c [d_c r_c]x', M_c = (1 - d_c d_c') / r_c^2.
+    The derivative of the point that two cameras triangulate with respect to their rotations w_c is
+    (sum M_c)^-1 M_c [d_c r_c]x' with M_c = (1 - d_c d_c') / r_c^2.
 
     Args:
-        pair: the two cameras with the covariance of their turns.
+        pair: the two cameras with the covariance of their rotations.
         cameras: (C,) cameras of the rig.
         body: (J, 6) positions and velocities.
-        out: (3, 3) receives the covariance [m^2].
+        out: (3, 3) covariance [m^2], filled in.
     """
     total, inverse, own = np.zeros((3, 3)), np.empty((3, 3)), np.empty((2, 3, 3))
     slope, half, full = np.zeros((6, 6)), np.empty((6, 6)), np.empty((6, 6))
@@ -321,7 +326,7 @@ def measure_displacement(pair: Pair, cameras: Records1[Camera], body: Floats, ou
 
 @kernel
 def write_projections(pair: Pair, frame: Frame) -> None:
-    """Write `frame.P`, the cameras of the rig with the turns of a misaligned pair."""
+    """Set `frame.P` to the cameras' projections, with the rotations of a misaligned pair."""
     for c in range(len(frame.P)):
         for i in range(3):
             for k in range(4):

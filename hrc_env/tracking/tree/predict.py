@@ -1,18 +1,19 @@
-"""Prediction: the tree a moment later, with exact moments.
+"""Prediction of the tree after a time step, with exact moments.
 
 Each joint is a second-order Gauss-Markov process (a damped oscillator driven by white noise) about
-an anchor: the root r (mean of the four torso states) plus the joint's mean place on the body,
-turned as the body is. It moves by x' = F x + D r + constant + noise, where D = [[1, dt], [0, 1]] -
-F lets it travel with the torso. All joints share the root's error: damping towards the anchor must
-not make it smaller.
+an anchor. The anchor is the root r (mean of the four torso states) plus the joint's mean position
+on the body, rotated with the body. The joint moves by x' = F x + D r + constant + noise, where D =
+[[1, dt], [0, 1]] - F lets it travel with the torso. All joints share the root's error, which
+damping towards the anchor must not reduce.
 
-That is linear in the 90 numbers, so that marginals and edges of the moved body follow exactly from
-Cov(x_j, r), which the tree gives by a recursion. Keeping these and forgetting all other
-covariances is the nearest Gaussian on the tree (least Kullback-Leibler divergence).
+The motion is linear in the 90 numbers. Therefore the marginal covariances and those of joints with
+their parents follow exactly from Cov(x_j, r), which a recursion over the tree computes. Keeping
+these and discarding all other covariances is the nearest Gaussian on the tree (smallest
+Kullback-Leibler divergence).
 
-A trunk that leans little counts as upright, as people's are: where one view leaves open how far it
-leans, that fixes the depth. One that lies takes head and arms with it; the legs go with it, or
-stay below it as in a person bending down, whichever is nearer.
+A trunk that leans little is assumed to be upright, which determines the depth if one view leaves
+the lean uncertain. Head and arms move with a lying trunk. The legs are aligned with the trunk, or
+vertical below it as in a person who bends down, whichever fits better.
 """
 
 import functools
@@ -27,50 +28,50 @@ from hrc_env.core.typing import Floats, Vector3
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 from hrc_env.tracking.tree.state import Tree, Work
 
-_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
+_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # _LEFT is parent of _RIGHT, _LEFT_HIP
 _REORDER = {"reassoc", "contract", "nsz"}
 _UPRIGHT_COSINE = math.cos(math.radians(25.0))
-"""Cosine of the angle from the vertical up to which a trunk counts as upright; judgement."""
+"""Cosine of the largest angle from the vertical of an upright trunk (an estimate)."""
 _LYING_COSINE = math.cos(math.radians(50.0))
-"""Cosine of the angle from the vertical from which a trunk counts as lying; judgement."""
+"""Cosine of the smallest angle from the vertical of a lying trunk (an estimate)."""
 _SHORT_M = 0.05
-"""Shortest line from right to left that gives a heading [m]."""
+"""Minimum length of the right-to-left vector for a heading [m]."""
 _KNEE, _FOOT = JOINT["left_knee"], JOINT["left_foot"]
 SPREAD_M: Floats = np.array(
     [0.06, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.22, 0.22]
 )
-"""(J,) standard deviation of a joint about its mean place on the body [m]; a judgement."""
+"""(J,) standard deviation of a joint about its mean position on the body [m] (an estimate)."""
 SPEED_M_S: Floats = np.array(
     [0.2, 0.2, 0.2, 0.5, 0.5, 0.95, 0.95, 0.2, 0.2, 0.5, 0.5, 0.9, 0.9, 0.95, 0.95]
 )
-"""(J,) standard deviation of its speed relative to the body [m/s]; a judgement: those of people at
-work are near it, and twice as much makes every prediction twice as uncertain as it is wrong."""
+"""(J,) standard deviation of a joint's speed relative to the body [m/s]. The values are an estimate
+for people at work; with doubled values, predicted standard deviations would be twice the errors."""
 _OFFSET_TAU_S = 2.0
-"""Time constant with which places on the body are forgotten [s]."""
+"""Time constant with which mean positions on the body are forgotten [s]."""
 _OFFSET_STD_M = 0.06
-"""Standard deviation of a joint's position above which nothing is learnt from it [m]."""
+"""Standard deviation of a joint's position above which its offset is not learnt [m]."""
 
 
 class JointMotion(NamedTuple):
     """The motion of every joint relative to its anchor over a time step."""
 
     F: Floats
-    """(J, 2, 2) transition of position and velocity, the same on each axis."""
+    """(J, 2, 2) transition matrix of position and velocity, the same on each axis."""
     Q: Floats
-    """(J, 2, 2) process noise of position and velocity."""
+    """(J, 2, 2) covariance of the process noise of position and velocity."""
 
 
 class MotionModel(NamedTuple):
     """The motion of the whole tree over a time step."""
 
     F: Floats
-    """(J, 2, 2) transition of each joint's position and velocity relative to its anchor."""
+    """(J, 2, 2) transition matrix of each joint's position and velocity relative to its anchor."""
     travel: Floats
-    """(J, 2, 2) transition of the anchor's position and velocity to the joint's."""
+    """(J, 2, 2) transition matrix from the anchor's position and velocity to the joint's."""
     Q: Floats
-    """(J, 2, 2) process noise of each joint."""
+    """(J, 2, 2) covariance of each joint's process noise."""
     shared: Floats
-    """(2, 2) part of the process noise that is the whole body's."""
+    """(2, 2) covariance of the process noise that the whole body shares."""
 
 
 class TorsoState(NamedTuple):
@@ -94,20 +95,20 @@ class Lean(NamedTuple):
     """The attitude of a trunk."""
 
     share: float
-    """0 for an upright trunk, 1 for a lying one."""
+    """Degree of lying, from 0 for an upright trunk to 1 for a lying one."""
     direction: Vector3
     """Unit vector from the hips to the shoulders in the world frame."""
 
 
 @kernel
 def predict_tree(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
-    """Move a hypothesis by one time step and learn its joints' places on the body.
+    """Move a hypothesis by one time step and learn the mean positions of joints on the body.
 
     Args:
         tree: the hypothesis, changed in place.
         model: motion over the time step.
         dt: the time step [s].
-        work: scratch.
+        work: work arrays.
     """
     cov, slope = tree.cov, tree.slope
     _move_means(tree, model, dt, work)
@@ -135,19 +136,19 @@ def predict_tree(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
 
 @kernel
 def measure_torso(body: Floats, i: int) -> float:
-    """Return component i of the mean of the torso's four joints, of a body (J, 3+)."""
+    """Return component `i` of the mean of the four torso joints of a body (J, 3+)."""
     return 0.25 * (body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i])
 
 
 @kernel
 def measure_trunk(body: Floats, i: int) -> float:
-    """Return component i of twice the vector from the middle of the hips to the shoulders'."""
+    """Return component `i` of twice the vector from mid-hip to mid-shoulder of a body (J, 3+)."""
     return body[_LEFT, i] + body[_RIGHT, i] - body[_LEFT_HIP, i] - body[_RIGHT_HIP, i]
 
 
 @kernel
 def _move_means(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
-    """Move the means of all joints with the torso and towards their places on the body."""
+    """Move the means of all joints with the torso and towards their mean positions on the body."""
     body, offset, axes, place = tree.body, tree.offset, work.axes, work.place
     root = TorsoState(
         measure_torso(body, 0),
@@ -177,12 +178,12 @@ def _move_means(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
 
 @kernel
 def _relate_torso(cov: Floats, slope: Floats, work: Work) -> None:
-    """Write `work.edge`, `work.root` = Cov(x_j, r) and `work.a` = Cov(r, r).
+    """Compute `work.edge` = Cov(x_j, x_q), `work.root` = Cov(x_j, r) and `work.a` = Cov(r, r).
 
     Args:
         cov: (J, 6, 6) marginal covariances.
         slope: (J, 6, 6) slopes on the parents.
-        work: scratch that receives the results.
+        work: work arrays, in which the results are stored.
     """
     for j in ORDER:
         if PARENT[j] >= 0:
@@ -223,20 +224,20 @@ def _move_covariance(
     cov: Floats,
     out: Floats,
 ) -> None:
-    """Write the covariance of joints j and m after a time step, without noise.
+    """Compute the covariance of joints `j` and `m` after a time step, without noise.
 
-    With f, d the transitions of joint j and of its anchor, g, e those of joint m, and the axes of
-    space left alone, it is f cov g' + f own e' + d other' g' + d torso e'.
+    With the transitions f, d of joint j and of its anchor, and g, e of joint m and of its anchor,
+    applied on each axis, it is f cov g' + f own e' + d other' g' + d torso e'.
 
     Args:
-        own: (6, 6) covariance of joint j with the torso's mean.
-        other: (6, 6) covariance of joint m with it.
+        own: (6, 6) covariance of joint `j` with the torso's mean.
+        other: (6, 6) covariance of joint `m` with the torso's mean.
         torso: (6, 6) covariance of the torso's mean.
         model: motion over the time step.
-        j: first joint.
-        m: second joint.
-        cov: (6, 6) covariance of the two joints before.
-        out: (6, 6) receives the covariance after.
+        j: index of the first joint.
+        m: index of the second joint.
+        cov: (6, 6) covariance of the two joints before the time step.
+        out: (6, 6) covariance of the two joints after the time step, filled in.
     """
     f, g, d, e = model.F[j], model.F[m], model.travel[j], model.travel[m]
     for i in range(3):
@@ -266,7 +267,7 @@ def _add_noise(noise: Floats, out: Floats) -> None:
 
 @kernel
 def measure_lean(body: Floats) -> Lean:
-    """Return how far the trunk of a body (J, 3+) lies."""
+    """Return the lean of the trunk of a body (J, 3+)."""
     x, y, z = measure_trunk(body, 0), measure_trunk(body, 1), measure_trunk(body, 2)
     length = math.sqrt(x * x + y * y + z * z) + 1e-9
     cosine = z / length
@@ -276,19 +277,19 @@ def measure_lean(body: Floats) -> Lean:
 
 @kernel
 def choose_axes(j: int) -> int:
-    """Return the index of the axes that joint j follows: 0 for the trunk's, 1 for the legs'."""
+    """Return the index of the axes with which joint `j` moves: 0 for the trunk, 1 for the legs."""
     return 1 if j >= _KNEE else 0
 
 
 @kernel
 def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bool:
-    """Write the axes of trunk and legs; return whether the trunk's are known.
+    """Compute the axes of trunk and legs; return whether those of the trunk are known.
 
     Args:
         body: (J, 3+) positions [m].
         root: mean of the torso's joints.
-        offset: (J, 3) places on the body [m].
-        axes: (2, 3, 3) receives the axes; columns forward, left and up.
+        offset: (J, 3) mean positions on the body [m].
+        axes: (2, 3, 3) axes with columns forward, left and up, filled in.
     """
     trunk, legs = axes[0], axes[1]
     lean = measure_lean(body)
@@ -305,7 +306,7 @@ def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bo
 
 @kernel
 def _complete_axes(body: Floats, axes: Floats) -> bool:
-    """Complete axes (3, 3) from their last column, up; return whether the body's left is known."""
+    """Complete axes (3, 3) from the last column, up; return whether the body's left is known."""
     length = along = across = 0.0
     for i in range(3):
         axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
@@ -327,13 +328,13 @@ def _complete_axes(body: Floats, axes: Floats) -> bool:
 
 @kernel
 def _are_legs_along_trunk(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bool:
-    """Return whether knees and ankles are nearer to the trunk's axes than to upright ones.
+    """Return whether the trunk's axes fit knees and ankles better than upright axes do.
 
     Args:
         body: (J, 3+) positions [m].
         root: mean of the torso's joints.
-        offset: (J, 3) places on the body [m].
-        axes: (2, 3, 3) the trunk's axes and upright ones.
+        offset: (J, 3) mean positions on the body [m].
+        axes: (2, 3, 3) the trunk's axes and upright axes.
     """
     difference = 0.0
     for j in range(_KNEE, _FOOT):
@@ -356,8 +357,8 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
         root_acceleration: spectral density of the whole body's acceleration [m^2/s^3].
 
     Returns:
-        The transition relative to the anchor, and process noise that keeps the stationary spreads
-        and adds the whole body's acceleration.
+        The transition relative to the anchor, and process noise that maintains the stationary
+        variances and adds the acceleration of the whole body.
     """
     frequency = SPEED_M_S / SPREAD_M
     damped = frequency * np.sqrt(1 - damping**2)
@@ -378,18 +379,18 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
 
 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
-    """Return the (2, 2) noise of position and velocity that all joints share over `dt_s` [s]."""
+    """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s]."""
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
 @kernel
 def _learn_offsets(tree: Tree, root: TorsoState, axes: Floats, dt: float) -> None:
-    """Learn the places on the body of joints with certain positions.
+    """Learn the mean positions on the body of joints with small uncertainty.
 
     Args:
         tree: the hypothesis; its offsets are changed in place.
         root: mean of the torso's joints.
-        axes: (2, 3, 3) as `set_axes` writes them.
+        axes: (2, 3, 3) axes of trunk and legs, from `set_axes`.
         dt: time since the last prediction [s].
     """
     body, cov, offset, offset_count = tree.body, tree.cov, tree.offset, tree.offset_count
@@ -408,7 +409,7 @@ def _learn_offsets(tree: Tree, root: TorsoState, axes: Floats, dt: float) -> Non
 
 @functools.lru_cache(maxsize=16)
 def make_motion_model(dt_s: float, damping: float, acceleration: float) -> MotionModel:
-    """Return the motion of the tree over a time step.
+    """Return the motion model of the tree over a time step.
 
     Args:
         dt_s: the time step [s].

@@ -1,9 +1,9 @@
-"""Report: the mixture of a worker's hypotheses, as wide as one view needs it.
+"""Moments of the mixture of a worker's hypotheses, with wider covariances for single views.
 
-The motion model is that of walking and working people. With one view, a person that spins, falls
-or runs is farther from the estimate than the Gaussian's deviations: the depth of joints follows
-from how the body is turned, and that is found late. `find_pace_factor` returns the factor on the
-covariance for it.
+The motion model describes people who walk and work. With one view, the errors for a person that
+spins, falls or runs exceed the Gaussian's standard deviations, because the depths of joints follow
+from the orientation of the body, which is then recognised late. `find_pace_factor` returns the
+factor on the covariance that accounts for this.
 """
 
 import math
@@ -18,43 +18,43 @@ from hrc_env.tracking.tree.predict import measure_lean, measure_torso, measure_t
 from hrc_env.tracking.tree.state import Hypotheses, Pace, Tree, WorkerHypotheses
 
 _FORGOTTEN_UPDATES = 8
-"""Updates without the worker after which a camera no longer counts as a view."""
+"""Number of updates without the worker after which a camera no longer counts as a view."""
 _TAU_S = 0.7
-"""Time constant of the means in `Pace` [s]."""
+"""Time constant of the averages in `Pace` [s]."""
 _MOST_RATE = 15.0
-"""Bound on every rate [rad/s] or [m/s]: no person moves faster."""
+"""Upper bound of every rate [rad/s] or [m/s], which no person exceeds."""
 
 
 class Excess(NamedTuple):
-    """The factor on the covariance for a movement that the motion model does not expect."""
+    """Dependence of the covariance on a rate that exceeds the range of the motion model."""
 
     limit: float
-    """Rate up to which the motion model is right [rad/s] or [m/s]."""
+    """Rate up to which the motion model is valid [rad/s] or [m/s]."""
     log_factor: float
-    """Logarithm of the factor for every unit above the limit [s/rad] or [s/m]."""
+    """Logarithm of the factor on the covariance per unit above the limit [s/rad] or [s/m]."""
 
 
 _TURN = Excess(2.3, 1.1)
-"""For turning about the vertical; all three were fitted to people walking, spinning, falling,
-tumbling and running."""
+"""Parameters for rotation about the vertical. Like `_TIP` and `_SPEED`, they were fitted to people
+walking, spinning, falling, tumbling and running."""
 _TIP = Excess(0.52, 5.0)
-"""For tipping."""
+"""Parameters for tilting of the trunk."""
 _SPEED = Excess(1.63, 1.1)
-"""For the speed of the trunk."""
+"""Parameters for the speed of the trunk."""
 MOST_MOVING = 10.5
-"""Greatest factor for movement."""
+"""Upper bound of the factor for movement."""
 _MOST = 25.0
-"""Greatest factor for movement and a lying body together."""
+"""Upper bound of the combined factor for movement and a lying body."""
 
 
 @kernel(makes_arrays=True)
 def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> None:
-    """Write the estimates of all workers.
+    """Compute the estimates of all workers.
 
     Args:
         state: the hypotheses.
         settings: settings of the estimator.
-        out: receives positions, covariances, velocities, ages and tracked workers.
+        out: arrays of the estimates, filled in.
     """
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
@@ -80,14 +80,14 @@ def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> 
 
 @kernel
 def _mix(trees: Records1[Tree], n: int, mean: Floats, cov: Floats, velocity: Floats) -> None:
-    """Write the moments of a mixture.
+    """Compute the moments of a mixture.
 
     Args:
-        trees: (H,) hypotheses of one worker.
-        n: number of those in use.
-        mean: (J, 3) receives the mean positions [m].
-        cov: (J, 3, 3) receives their covariances [m^2].
-        velocity: (J, 3) receives the mean velocities [m/s].
+        trees: (H,) hypotheses about one worker.
+        n: number of hypotheses in use.
+        mean: (J, 3) mean positions [m], filled in.
+        cov: (J, 3, 3) covariances of the positions [m^2], filled in.
+        velocity: (J, 3) mean velocities [m/s], filled in.
     """
     mean[:], cov[:], velocity[:] = 0.0, 0.0, 0.0
     for h in range(n):
@@ -107,7 +107,7 @@ def _mix(trees: Records1[Tree], n: int, mean: Floats, cov: Floats, velocity: Flo
 
 @kernel
 def measure_pace(worker: WorkerHypotheses) -> None:
-    """Update a worker's pace by the motion of the heaviest hypothesis since the last update."""
+    """Update a worker's pace from the motion of the heaviest hypothesis since the last update."""
     pace = worker.pace[0]
     update_pace(pace, worker.trees[0].body, pace.since_s)
     pace.since_s = 0.0
@@ -115,7 +115,7 @@ def measure_pace(worker: WorkerHypotheses) -> None:
 
 @kernel
 def update_pace(pace: Pace, body: Floats, dt: float) -> None:
-    """Take the present body (J, 6), `dt` [s] after the last one, into the means."""
+    """Update the averages of a pace with a body (J, 6), `dt` [s] after the last one."""
     ax, ay = _measure_width(body, 0), _measure_width(body, 1)
     ux, uy, uz = measure_trunk(body, 0), measure_trunk(body, 1), measure_trunk(body, 2)
     flat, length = math.hypot(ax, ay) + 1e-9, math.sqrt(ux * ux + uy * uy + uz * uz) + 1e-9
@@ -138,14 +138,14 @@ def update_pace(pace: Pace, body: Floats, dt: float) -> None:
 
 @kernel
 def forget_pace(pace: Pace) -> None:
-    """Put a pace back to that at the beginning of a track."""
+    """Reset a pace to its state at the start of a track."""
     pace.is_known, pace.since_s = False, 0.0
     pace.turn_rad_s = pace.tip_rad_s = pace.speed_m_s = 0.0
 
 
 @kernel
 def find_pace_factor(pace: Pace) -> float:
-    """Return the factor on the covariance, with one view, for the movement of a worker."""
+    """Return the factor on the covariance in a single view for the movement of a worker."""
     log_factor = _TURN.log_factor * max(pace.turn_rad_s - _TURN.limit, 0.0)
     log_factor += _TIP.log_factor * max(pace.tip_rad_s - _TIP.limit, 0.0)
     log_factor += _SPEED.log_factor * max(pace.speed_m_s - _SPEED.limit, 0.0)
@@ -154,11 +154,11 @@ def find_pace_factor(pace: Pace) -> float:
 
 @kernel
 def _fade(mean: float, rate: float, keep: float) -> float:
-    """Return a fading mean after another rate, of which 1 - `keep` is taken in."""
+    """Return an exponential moving average after another rate, with the weight 1 - `keep`."""
     return keep * mean + (1.0 - keep) * min(rate, _MOST_RATE)
 
 
 @kernel
 def _measure_width(body: Floats, i: int) -> float:
-    """Return component i of twice the vector from right to left, across shoulders and hips."""
+    """Return component `i` of the sum of the right-to-left vectors of shoulders and hips."""
     return body[1, i] + body[7, i] - body[2, i] - body[8, i]

@@ -1,15 +1,16 @@
-"""Search: the most probable positions of a body, given its prediction and one frame.
+"""Search for the most probable positions of a body, given its prediction and one set of frames.
 
-Robust Gauss-Newton on the positions of the tree. Cameras inform single joints, bones inform edges.
-The likelihood of a pixel is a Gaussian about the joint's image or, with the outlier weight,
-anything in the image. The search begins with it widened by the prior's own uncertainty, so that
-good measurements of a badly predicted joint are not taken for outliers (graduated non-convexity).
-Each step solves one 45x45 system exactly by elimination from the leaves to the root and
-substitution back.
+The search is a robust Gauss-Newton method on the positions of the tree. Measurements of cameras
+concern single joints, and bone lengths concern edges of the tree. The likelihood of a pixel is the
+mixture of a Gaussian about the joint's image and, with the outlier weight, a uniform density over
+the image. At first, the Gaussian is widened by the uncertainty of the prediction, so that good
+measurements of a badly predicted joint are not mistaken for outliers (graduated non-convexity).
+Each step solves one 45x45 system exactly by elimination from the leaves to the root and back
+substitution.
 
-All joints in one camera are computed at once: a row for each quantity, a column for each joint.
-Columns are filled up to a whole number of processor vectors, so that loops over them are compiled
-to vector instructions.
+All joints in one camera are processed at once, with one row for each quantity and one column for
+each joint. The number of columns is padded to a multiple of the vector length, so that loops over
+columns are compiled to vector instructions.
 """
 
 import math
@@ -25,7 +26,7 @@ from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M, LANES, N_IMAGE, Tree, 
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 BELIEF, LOG_ODDS, FACTOR, A0, A1, A2, B0, B1, B2, DU, DV, NEARNESS = range(N_IMAGE)
-"""Rows of `Work.image`; see `state.N_IMAGE`."""
+"""Indices of the rows of `Work.image`; see `state.N_IMAGE`."""
 _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
@@ -35,12 +36,13 @@ def find_pose(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
 
     Args:
         tree: the predicted hypothesis.
-        frame: the measurements; `belief` and `images` are written.
+        frame: the measurements; `belief` and `images` are filled in.
         settings: settings of the estimator.
-        work: scratch. It receives the positions (`point`), the variances of the bones as
-            measurements, and information and gradient of cameras and bones: those of the
-            log-likelihood as a function of the positions (of joints, and of joints less their
-            parents') minus their predicted means, at 0.
+        work: work arrays. The positions (`point`), the variances of the bones as measurements, and
+            the information and gradients of cameras and bones are filled in. The gradients are
+            those of the linearised log-likelihoods at the predicted means: for cameras with respect
+            to the positions of joints, and for bones with respect to the positions relative to the
+            parents.
     """
     set_bone_variances(tree.bone_variance, settings.bone_variation_scale, work.bone_variance)
     for j in range(len(tree.body)):
@@ -53,16 +55,16 @@ def find_pose(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
 def find_pose_near(
     tree: Tree, frame: Frame, settings: Settings, n_steps: int, widen: float, work: Work
 ) -> None:
-    """Do as `find_pose`, but begin at `work.point` instead of the predicted means.
+    """Find the most probable positions as in `find_pose`, starting from `work.point`.
 
     Args:
         tree: the predicted hypothesis.
-        frame: the measurements; `belief` and `images` are written.
+        frame: the measurements; `belief` and `images` are filled in.
         settings: settings of the estimator.
         n_steps: number of Gauss-Newton steps.
-        widen: factor on the prior's own image variance that is added to the detector's in the
-            first step; it is halved from step to step.
-        work: scratch with the start and the bones' variances; it receives the same as there.
+        widen: factor on the prediction's pixel variance, which is added to the detector's variance
+            in the first step; it is halved in every further step.
+        work: work arrays with the start and the bones' variances; results as in `find_pose`.
     """
     body, cov, slope = tree.body, tree.cov, tree.slope
     for j in ORDER:
@@ -86,12 +88,13 @@ def find_pose_near(
 
 @kernel(fastmath=_REORDER)
 def _set_position_prior(j: int, cov: Floats, work: Work) -> None:
-    """Write the precision of a joint's position given its parent's, and its slope on that.
+    """Compute the precision of a joint's position given its parent's position, and the slope on it.
 
     Args:
-        j: the joint.
+        j: index of the joint.
         cov: (J, 6, 6) predicted covariances.
-        work: scratch with `edge`; the fields of the joint that begin with `position` are written.
+        work: work arrays with `edge`; the joint's entries in fields named `position_*` are filled
+            in.
     """
     q: int = PARENT[j]
     precision = work.position_precision[j]
@@ -125,14 +128,15 @@ def _set_position_prior(j: int, cov: Floats, work: Work) -> None:
 def _linearise_cameras(
     frame: Frame, inlier_odds: float, widening: float, is_last: bool, work: Work
 ) -> None:
-    """Write the cameras' information and gradient at `work.point`.
+    """Compute the cameras' information and gradient at `work.point`.
 
     Args:
-        frame: the measurements; `belief` is written.
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
-        widening: factor on the prior's image variance that is added to the detector's.
-        is_last: whether the Jacobians and residuals are kept in `frame.images`.
-        work: scratch.
+        frame: the measurements; `belief` is filled in.
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel
+            variance [px^2].
+        widening: factor on the prediction's pixel variance, which is added to the detector's.
+        is_last: whether to store the Jacobians and residuals in `frame.images`.
+        work: work arrays.
     """
     points, sums, belief = work.points, work.sums, frame.belief
     for j in range(len(belief)):
@@ -162,12 +166,12 @@ def _linearise_cameras(
 def _add_floor(body: Floats, information: float, work: Work) -> None:
     """Add a measurement of height 0 to joints below the floor.
 
-    One view leaves the distance of a body open; that no joint is below the floor bounds it.
+    It bounds the distance of a body, which is uncertain in one view.
 
     Args:
         body: (J, 6) predicted means.
         information: information of the measurement [1/m^2].
-        work: scratch; the camera information and gradient are changed.
+        work: work arrays; the camera information and gradient are changed.
     """
     for j in range(len(body)):
         if work.point[j, 2] < 0.0:
@@ -177,7 +181,7 @@ def _add_floor(body: Floats, information: float, work: Work) -> None:
 
 @kernel(fastmath=_REORDER)
 def _linearise_bones(bone_length: Floats, work: Work) -> None:
-    """Write information and gradient of the bones (J,) from joints to their parents."""
+    """Compute the information and gradients of the bones (J,) from joints to their parents."""
     for j in ORDER:
         q: int = PARENT[j]
         a, b = work.point[j], work.point[q]
@@ -198,16 +202,16 @@ def _linearise_bones(bone_length: Floats, work: Work) -> None:
 
 @kernel(fastmath=_REORDER)
 def _add_second_bone(cov: Floats, bone_length: Floats, work: Work) -> None:
-    """Add the bone from the nose to the right shoulder to the nose's edge.
+    """Add the bone from the nose to the right shoulder to the edge of the nose.
 
-    One bone alone would leave the nose's mirror image open. The second is no edge of the tree: the
-    right shoulder counts as a point that the left one carries, and the uncertainty of where it is
-    carried counts as noise.
+    One bone alone does not exclude the mirror image of the nose. The second one is not an edge of
+    the tree. Therefore the right shoulder is considered rigidly connected to the left one, and the
+    uncertainty of their relative position is added to the noise.
 
     Args:
         cov: (J, 6, 6) predicted covariances.
         bone_length: (J,) lengths of the bones [m].
-        work: scratch; information and gradient of the nose's edge are changed.
+        work: work arrays; information and gradient of the nose's edge are changed.
     """
     nose, right = _NOSE, _RIGHT_SHOULDER
     left: int = PARENT[_RIGHT_SHOULDER]
@@ -230,11 +234,11 @@ def _add_second_bone(cov: Floats, bone_length: Floats, work: Work) -> None:
 
 @kernel
 def _solve_positions(body: Floats, work: Work) -> None:
-    """Write the shifts that minimise the quadratic of prior, cameras and bones.
+    """Compute the shifts that minimise the quadratic form of prior, cameras and bones.
 
     Args:
         body: (J, 6) predicted means.
-        work: scratch with the linearised likelihood; `shift` and `point` are written.
+        work: work arrays with the linearised likelihood; `shift` and `point` are filled in.
     """
     for j in ORDER:
         for i in range(3):
@@ -257,7 +261,7 @@ def _solve_positions(body: Floats, work: Work) -> None:
 
 @kernel(fastmath=_REORDER)
 def _eliminate(j: int, work: Work) -> None:
-    """Write slope and inverse Hessian of a joint's shift; pass its information to the parent."""
+    """Compute slope and inverse Hessian of a joint's shift; pass its information to the parent."""
     q: int = PARENT[j]
     bone, node, gradient = work.edge_information[j], work.node[j], work.node_gradient[j]
     inverse, total, together = work.position_inverse[j], work.a, work.b
@@ -287,7 +291,7 @@ def _eliminate(j: int, work: Work) -> None:
 
 @kernel
 def _set_views(frame: Frame) -> None:
-    """Write pixels and precisions into `frame.views`."""
+    """Copy pixels and precisions to `frame.views`."""
     z, sigma, ok, views = frame.z, frame.sigma, frame.ok, frame.views
     for c in range(len(views)):
         for j in range(len(ok)):
@@ -299,7 +303,7 @@ def _set_views(frame: Frame) -> None:
 
 @kernel
 def _set_covariances(cov: Floats, points: Floats) -> None:
-    """Write position covariances (J, 3+, 3+) into their rows of points (N_POINT, LANES)."""
+    """Copy position covariances (J, 3+, 3+) to their rows of `points` (N_POINT, LANES)."""
     for j in range(len(cov)):
         points[3, j], points[4, j], points[5, j] = cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2]
         points[6, j], points[7, j], points[8, j] = cov[j, 0, 1], cov[j, 0, 2], cov[j, 1, 2]
@@ -315,17 +319,18 @@ def _add_view(
     image: Floats,
     sums: Floats,
 ) -> None:
-    """Add one camera's information and gradient of all joints.
+    """Add one camera's information and gradient for all joints.
 
     Args:
         p: (3, 4) projection.
         points: (N_POINT, LANES) positions and predicted covariances.
         view: (N_VIEW, LANES) pixels and precisions.
-        widen: factor on the prior's image variance that is added to the detector's in the
-            weights of the measurements.
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
-        image: (N_IMAGE, LANES) receives weights, Jacobians and residuals.
-        sums: (N_SUM, LANES) to which information and gradient are added.
+        widen: factor on the prediction's pixel variance, which is added to the detector's variance
+            in the weights of the measurements.
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel
+            variance [px^2].
+        image: (N_IMAGE, LANES) weights, Jacobians and residuals, filled in.
+        sums: (N_SUM, LANES) information and gradient, increased in place.
     """
     _project(p, points, view, widen, inlier_odds, image)
     for j in range(LANES):
@@ -356,7 +361,7 @@ def _project(
     inlier_odds: float,
     image: Floats,
 ) -> None:
-    """Write Jacobians, residuals and odds of all joints in one camera; arguments of `_add_view`."""
+    """Compute Jacobians, residuals and odds of all joints in one camera; see `_add_view`."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]
     p10, p11, p12, p13 = p[1, 0], p[1, 1], p[1, 2], p[1, 3]
     p20, p21, p22, p23 = p[2, 0], p[2, 1], p[2, 2], p[2, 3]
@@ -386,12 +391,13 @@ def _project(
 
 @kernel
 def set_bone_variances(variance: Floats, give: float, out: Floats) -> None:
-    """Write the variances of the bones' lengths as measurements.
+    """Compute the variances of the bones' lengths as measurements.
 
     Args:
         variance: (J,) variances of the learnt lengths [m^2].
         give: factor on the standard deviation of a length within one person.
-        out: (J,) receives the sums of both variances [m^2].
+        out: (J,) sums of the variances of the learnt lengths and of those within one person [m^2],
+            filled in.
     """
     for j in range(len(variance)):
         out[j] = variance[j] + (give * EDGE_STIFFNESS_M[j]) ** 2

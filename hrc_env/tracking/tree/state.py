@@ -1,9 +1,9 @@
-"""The state of the default estimator, as records declared in one place.
+"""Record types for the state of the default estimator.
 
-The joints of a body share their errors: with one view the depth of all of them is wrong together.
-So the whole body is one Gaussian with the dependencies of the kinematic tree (`gaussian`), and a
-worker is a few such hypotheses. `predict` moves them, `update` conditions them on a frame,
-`evidence` weighs them.
+The errors of a body's joints are correlated; with one view, for example, all depths are wrong
+together. Therefore the whole body is one Gaussian with the dependencies of the kinematic tree
+(`gaussian`), and a few such hypotheses represent a worker. `predict` moves them, `update`
+conditions them on a set of frames, and `evidence` weights them.
 """
 
 from typing import Annotated, NamedTuple
@@ -26,18 +26,20 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ROOT
 
 LANES = 16
-"""Columns of the arrays of `search`: one for each joint, and one that is padding."""
+"""Number of columns of the arrays of `search`: one for each joint, and one for padding."""
 N_POINT = 9
-"""Rows of `Work.points`: x, y, z [m]; then 00, 11, 22, 01, 02, 12 of the predicted position
-covariance [m^2]."""
+"""Number of rows of `Work.points`: x, y, z [m], and entries 00, 11, 22, 01, 02, 12 of the predicted
+position covariance [m^2]."""
 N_VIEW = 3
-"""Rows of `Frame.views`: u, v [px] and precision [1/px^2]; all 0 without a measurement."""
+"""Number of rows of `Frame.views`: u, v [px] and precision [1/px^2]; all 0 without a
+measurement."""
 N_IMAGE = 12
-"""Rows of `Work.image`: weight of the measurement, 0 to 1; logarithm and factor of its odds of
-being an inlier; Jacobians of u and of v [px/m]; residuals [px]; reciprocal of the depth [1/m], 0
-for a joint without a usable pixel."""
+"""Number of rows of `Work.image`: weight of the measurement, 0 to 1; logarithm of the Gaussian in
+its odds of being an inlier, and the remaining factor; Jacobians of u and of v [px/m]; residuals
+[px]; reciprocal of the depth [1/m], 0 for a joint without a usable pixel."""
 N_SUM = 9
-"""Rows of `Work.sums`: information 00, 11, 22, 01, 02, 12 [1/m^2], then gradient [1/m]."""
+"""Number of rows of `Work.sums`: entries 00, 11, 22, 01, 02, 12 of the information [1/m^2], and the
+gradient [1/m]."""
 STANDING_M: Floats = np.array(
     [
         (0.12, 0.00, 0.42),
@@ -50,220 +52,229 @@ STANDING_M: Floats = np.array(
         (0.14, 0.11, -1.14), (0.14, -0.11, -1.14),
     ]
 )  # fmt: skip
-"""(J, 3) joints of a standing adult from the middle of the torso [m]: forward, left, up."""
+"""(J, 3) joints of a standing adult relative to the centre of the torso, forward, left and up
+[m]."""
 STANDING_COUNT = 5.0
-"""Updates that the standing body's offsets are worth before any was learnt."""
+"""Number of updates to which the offsets of the standing body correspond when offsets are learnt.
+"""
 N_SUMS = 5
 """Length of `Noise.sums`."""
 SQUARES, REDUNDANCY, PRODUCTS, LAST_SQUARES, TURN = range(N_SUMS)
-"""Entries of `Noise.sums`: fading sums of the residuals' squares, of their redundancy, of their
-products with the last residuals and of the last residuals' squares; and, at the first joint and
-camera only, the number of the turn in which joints are learnt from."""
+"""Entries of `Noise.sums`: exponentially fading sums of the squared residuals, of their redundancy,
+of their products with the previous residuals, and of the squared previous residuals. The last entry
+is used for the first joint and camera only; it is the index of the group of joints whose noise is
+learnt in the next update."""
 POPULATION_SHARE = 0.10
-"""Standard deviation of a bone's length over people, as a share of it."""
+"""Standard deviation of a bone's length among people, relative to that length."""
 STIFFNESS_M: Floats = np.where(np.any(JOINT["nose"] == BONES, axis=-1), 0.05, 0.02)
-"""Standard deviation of each distance of `skeleton.BONES` within one person [m]: the head turns
-on its neck."""
+"""Standard deviation of each distance of `skeleton.BONES` within one person [m]; it is larger for
+distances from the nose, because the head moves relative to the shoulders."""
 EDGE_STIFFNESS_M = tuple(
     0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE)
 )
-"""The same of the edge from each joint to its parent [m]; 0 at the root."""
+"""Standard deviation of the distance from each joint to its parent within one person [m]; 0 for the
+root."""
 _J = N_JOINTS
 
 
 class Pair:
-    """The relative calibration of two cameras that alone see a worker.
-
-    `pair_calibration` learns it.
-    """
+    """Relative calibration of the only two cameras that see a worker; see `pair_calibration`."""
 
     cameras: Annotated[Ints, (2,)]
     """Indices of the two cameras."""
     information: Annotated[Floats, (6, 6)]
-    """Fading information of the gaps between lines of sight about the turns [1/rad^2]."""
+    """Fading information about the rotations from the gaps between lines of sight [1/rad^2]."""
     score: Annotated[Floats, (6,)]
-    """Information times the turns that the gaps alone measure [1/rad]."""
+    """Product of `information` and the rotations that the gaps alone indicate [1/rad]."""
     turn: Annotated[Floats, (6,)]
     """Estimated rotation vectors of the first and of the second camera in the world frame [rad]."""
     turn_cov: Annotated[Floats, (6, 6)]
     """Covariance of the two rotation vectors [rad^2]."""
     meeting_share: float
-    """Share of the last updates, fading, in which the lines of sight of most joints met."""
+    """Fading share of updates in which the lines of sight of most joints met."""
     is_misaligned: bool
-    """Whether the cameras count as turned against their calibration."""
+    """Whether the cameras are considered rotated relative to their calibration."""
     untracked_updates: int
-    """Updates in which both cameras showed a person without a track, less those in which not."""
+    """Number of updates in which exactly two cameras showed a person without a track, less the
+    number of other updates; at least 0."""
 
 
 class Tree:
-    """The Gaussian of one hypothesis about one worker, with all that it has learnt about them."""
+    """One hypothesis about one worker: a Gaussian body, and parameters learnt for the worker."""
 
     body: Annotated[Floats, (_J, 6)]
     """Mean position [m] and velocity [m/s] of each joint in the world frame."""
     cov: Annotated[Floats, (_J, 6, 6)]
     """Marginal covariance of each joint's position and velocity."""
     slope: Annotated[Floats, (_J, 6, 6)]
-    """Slope of each joint on its parent (B_j of `gaussian`); without meaning at the root."""
+    """Slope of each joint on its parent (B_j of `gaussian`); undefined for the root."""
     age_s: Annotated[Floats, (_J,)]
     """Time since a measurement last supported the joint [s]."""
     conflict: Annotated[Ints, (_J,)]
-    """Updates in a row in which two or more cameras measured the joint without supporting it."""
+    """Number of successive updates in which two or more cameras measured the joint and at most one
+    supported the estimate."""
     tracked: bool
     """Whether the worker is tracked."""
     one_view_updates: int
-    """Updates in which one camera alone has shown a person while the worker was not tracked, less
-    those in which not."""
+    """Number of updates in which exactly one camera showed a person while the worker was not
+    tracked, less the number of other updates; at least 0."""
     size_std: float
-    """Relative standard deviation of the size, and with it of the distance, of a body while one
-    camera alone has begun its track; 0 once two cameras agree."""
+    """Relative standard deviation of the size, and therefore of the distance, of a body with a
+    track started from one view; 0 once two cameras agree."""
     pair: Pair
-    """Relative calibration of the two cameras that alone see the body."""
+    """Relative calibration of the only two cameras that see the body."""
     displaced_m2: Annotated[Floats, (3, 3)]
-    """Covariance of the body's displacement as a whole that the uncertain turns of `pair` leave
+    """Covariance of a displacement of the whole body due to the uncertain rotations in `pair`
     [m^2]."""
     offset: Annotated[Floats, (_J, 3)]
-    """Mean place of each joint relative to the middle of the torso, in the torso's axes forward,
-    left and up [m]."""
+    """Mean position of each joint relative to the centre of the torso, along the body's axes
+    forward, left and up [m]."""
     offset_count: Annotated[Floats, (_J,)]
     """Number of updates from which the joint's offset was learnt."""
     bone_length: Annotated[Floats, (_J,)]
     """Distance from each joint to its parent [m]."""
     bone_variance: Annotated[Floats, (_J,)]
-    """Variance of that distance [m^2]."""
+    """Variance of the distance from each joint to its parent [m^2]."""
     log_weight: float
     """Logarithm of the hypothesis's probability."""
     pose_log_prior: float
-    """The part of `log_weight` that the present pose's plausibility contributes."""
+    """Contribution to `log_weight` of the plausibility of the current pose."""
 
 
 class View:
-    """Memory of one camera in a hypothesis."""
+    """State of one camera in a hypothesis."""
 
     swap_chance: float
-    """Probability that the camera exchanges left and right."""
+    """Probability that the camera's left and right labels are swapped."""
     unseen_updates: int
-    """Updates since the camera last saw the worker."""
+    """Number of updates since the camera last saw the worker."""
     trusted_updates: int
-    """Updates for which the camera's left and right are still taken as they are."""
+    """Number of further updates for which the camera's left and right labels are trusted."""
 
 
 class Noise:
-    """The measurement noise of one joint in one camera, as `learning` learns it."""
+    """Measurement noise of one joint in one camera; see `learning`."""
 
     factor: float
     """Learnt factor on the variance that the detector reports."""
     sums: Annotated[Floats, (N_SUMS,)]
-    """Statistics that the factor is learnt from; see `SQUARES` and the names after it."""
+    """Statistics from which the factor is learnt; see `SQUARES` and the names defined with it."""
     last_residual: Annotated[Floats, (2,)]
-    """Last residuals of u and v in reported standard deviations, fading; 0 without any."""
+    """Last residuals of u and v in units of the reported standard deviation; they decay to 0
+    without measurements."""
 
 
 class Pace:
-    """How fast a worker has moved lately."""
+    """Recent speed of a worker's motion."""
 
     across: Annotated[Floats, (2,)]
-    """Unit vector across hips and shoulders on the floor in the last update."""
+    """Unit vector from right to left across hips and shoulders, projected onto the floor, at the
+    last update."""
     up: Annotated[Floats, (3,)]
-    """Unit vector from the hips to the shoulders in the last update."""
+    """Unit vector from the hips to the shoulders at the last update."""
     since_s: float
     """Time since the last update [s]."""
     is_known: bool
-    """Whether there was an update since the track began."""
+    """Whether there has been an update since the track started."""
     turn_rad_s: float
-    """Fading mean of the rate of turning about the vertical [rad/s]."""
+    """Exponential moving average of the rate of rotation about the vertical [rad/s]."""
     tip_rad_s: float
-    """Fading mean of the rate at which the trunk tips [rad/s]."""
+    """Exponential moving average of the rate at which the trunk tilts [rad/s]."""
     speed_m_s: float
-    """Fading mean of the trunk's speed [m/s]."""
+    """Exponential moving average of the trunk's speed [m/s]."""
 
 
 class Work:
-    """Scratch of the kernels for one tree; j is a joint, q its parent."""
+    """Work arrays of the kernels for one tree; j denotes a joint and q its parent."""
 
     a: Annotated[Floats, (6, 6)]
-    """Scratch matrix."""
+    """Temporary matrix."""
     b: Annotated[Floats, (6, 6)]
-    """Scratch matrix."""
+    """Temporary matrix."""
     c: Annotated[Floats, (6, 6)]
-    """Scratch matrix."""
+    """Temporary matrix."""
     d: Annotated[Floats, (6, 6)]
-    """Scratch matrix."""
+    """Temporary matrix."""
     edge: Annotated[Floats, (_J, 6, 6)]
     """Covariance of each joint with its parent."""
     root: Annotated[Floats, (_J, 6, 6)]
     """Covariance of each joint with the mean of the four torso joints."""
     moved: Annotated[Floats, (_J, 6, 6)]
-    """Covariance of each joint a moment later; growth of it in `update.widen_jumped_joints`."""
+    """Covariance of each joint after a time step; in `update.widen_jumped_joints`, the increase of
+    the covariance."""
     moved_edge: Annotated[Floats, (_J, 6, 6)]
-    """Covariance of each joint with its parent a moment later."""
+    """Covariance of each joint with its parent after a time step."""
     precision: Annotated[Floats, (_J, 6, 6)]
-    """Precision of each joint given its parent, P_j; with the bone's information, if added."""
+    """Precision P_j of each joint given its parent, plus the bone's information once it is
+    added."""
     coupling: Annotated[Floats, (_J, 6, 6)]
-    """Coupling P_j B_j of each joint to its parent; with the bone's information, if added."""
+    """Coupling P_j B_j of each joint to its parent, plus the bone's information once it is
+    added."""
     back: Annotated[Floats, (_J, 6, 6)]
-    """Information B_j' P_j B_j of each joint about its parent; with the bone's, if added."""
+    """Information B_j' P_j B_j of each joint about its parent, plus the bone's information once it
+    is added."""
     known: Annotated[Floats, (_J, 6, 6)]
-    """Information of the cameras and of the subtree about each joint."""
+    """Information about each joint from the cameras and from its subtree."""
     inverse: Annotated[Floats, (_J, 6, 6)]
     """Inverse Hessian of each joint given its parent."""
     step: Annotated[Floats, (_J, 6)]
     """Change of the means."""
     gradient: Annotated[Floats, (_J, 6)]
-    """Gradient of the log-likelihood about the means."""
+    """Gradient of the log-likelihood with respect to the means."""
     position_precision: Annotated[Floats, (_J, 3, 3)]
-    """Precision of each position given the parent's [1/m^2]."""
+    """Precision of each position given the parent's position [1/m^2]."""
     position_slope: Annotated[Floats, (_J, 3, 3)]
-    """Slope of each position on the parent's."""
+    """Slope of each position on the parent's position."""
     position_coupling: Annotated[Floats, (_J, 3, 3)]
-    """Precision times slope of each position [1/m^2]."""
+    """Product of precision and slope of each position [1/m^2]."""
     position_back: Annotated[Floats, (_J, 3, 3)]
-    """Information of each position's slope about the parent's position [1/m^2]."""
+    """Information of each position about the parent's position [1/m^2]."""
     position_inverse: Annotated[Floats, (_J, 3, 3)]
-    """Inverse Hessian of each position given the parent's [m^2]."""
+    """Inverse Hessian of each position given the parent's position [m^2]."""
     node: Annotated[Floats, (_J, 3, 3)]
-    """Information of the cameras and of the subtree about each position [1/m^2]."""
+    """Information about each position from the cameras and from its subtree [1/m^2]."""
     node_gradient: Annotated[Floats, (_J, 3)]
-    """Gradient that belongs to `node` [1/m]."""
+    """Gradient that corresponds to `node` [1/m]."""
     point: Annotated[Floats, (_J, 3)]
     """Positions at which the likelihood is linearised [m]."""
     shift: Annotated[Floats, (_J, 3)]
-    """Those positions minus the predicted means [m]."""
+    """Difference between `point` and the predicted means [m]."""
     camera_information: Annotated[Floats, (_J, 3, 3)]
     """Information of the cameras about the shift of each joint [1/m^2]."""
     camera_gradient: Annotated[Floats, (_J, 3)]
-    """Gradient of the cameras' log-likelihood at no shift [1/m]."""
+    """Gradient of the cameras' log-likelihood at zero shift [1/m]."""
     edge_information: Annotated[Floats, (_J, 3, 3)]
-    """Information of the bones about x_j - x_q [1/m^2]; without meaning at the root."""
+    """Information of the bones about x_j - x_q [1/m^2]; undefined for the root."""
     edge_gradient: Annotated[Floats, (_J, 3)]
-    """Gradient of the bones' log-likelihood at no shift [1/m]; without meaning at the root."""
+    """Gradient of the bones' log-likelihood at zero shift [1/m]; undefined for the root."""
     points: Annotated[Floats, (N_POINT, LANES)]
-    """Positions and predicted covariances, a column for each joint; see `N_POINT`."""
+    """Positions and predicted covariances, with one column for each joint; see `N_POINT`."""
     image: Annotated[Floats, (N_IMAGE, LANES)]
-    """The joints in one camera; see `N_IMAGE`."""
+    """Measurements and linearised projections of the joints in one camera; see `N_IMAGE`."""
     sums: Annotated[Floats, (N_SUM, LANES)]
     """Information and gradient of the cameras; see `N_SUM`."""
     spread: Annotated[Floats, (3, 4)]
-    """Covariance of a joint triangulated from one frame [m^2] and, in the last column, its offset
-    from the mean [m]."""
+    """Covariance of a joint triangulated from one set of frames [m^2] and, in the last column, its
+    offset from the mean [m]."""
     persistence: Annotated[Floats, (_J,)]
-    """Factor on a joint's variance for errors that persist, of which only a part averages out;
-    negative for a joint that is not learnt from."""
+    """Factor on a joint's variance for persistent errors, which filtering reduces less; negative
+    for a joint whose noise is not learnt in this update."""
     n_views: Annotated[Ints, (_J,)]
     """Number of cameras that measured each joint."""
     bone_variance: Annotated[Floats, (_J,)]
-    """Variances of the bones' lengths as measurements [m^2]."""
+    """Variance of each bone length as a measurement [m^2]."""
     offset: Annotated[Floats, (_J, 3)]
-    """Copy of `Tree.offset` where a prediction must not change it [m]."""
+    """Copy of `Tree.offset`, to restore it after a prediction [m]."""
     offset_count: Annotated[Floats, (_J,)]
-    """Copy of `Tree.offset_count` likewise."""
+    """Copy of `Tree.offset_count`, to restore it after a prediction."""
     predicted: Annotated[Floats, (_J, 3, 3)]
     """Position covariances before the update [m^2]."""
     is_placed: Annotated[NDArray[np.int8], (_J,)]
-    """1 for joints that were found again in this update."""
+    """1 for joints that were acquired anew in this update, else 0."""
     axes: Annotated[Floats, (2, 3, 3)]
-    """Axes of the trunk and of the legs; columns forward, left and up."""
+    """Axes of the trunk and of the legs, with columns forward, left and up."""
     place: Annotated[Floats, (3,)]
-    """Mean place of a joint relative to the torso in the world's axes [m]."""
+    """Mean position of a joint relative to the torso, along the world's axes [m]."""
 
 
 PAIR = dtype_of(Pair)
@@ -275,50 +286,51 @@ WORK = dtype_of(Work)
 
 
 class Hypotheses(NamedTuple):
-    """The hypotheses about every worker; kernels change the arrays in place."""
+    """The hypotheses about every worker, in arrays that kernels change in place."""
 
     trees: Records3[Tree]
-    """(B, W, H) Gaussians; the weights of those in use sum to one, the first is the heaviest."""
+    """(B, W, H) Gaussian bodies, of which the first is the heaviest; the weights of those in use
+    sum to one."""
     views: Records4[View]
-    """(B, W, H, C) memory of each camera."""
+    """(B, W, H, C) state of each camera."""
     noise: Records5[Noise]
     """(B, W, H, J, C) learnt measurement noise."""
     n_alive: Ints
     """(B, W) number of hypotheses in use, at least one."""
     since_search_s: Floats
-    """(B, W) time since other hypotheses were last searched for [s]."""
+    """(B, W) time since the last search for alternative hypotheses [s]."""
     pace: Records2[Pace]
     """(B, W) recent speed of the heaviest hypothesis."""
 
 
 class WorkerHypotheses(NamedTuple):
-    """The hypotheses about one worker: views into `Hypotheses`."""
+    """The hypotheses about one worker, as views of the arrays in `Hypotheses`."""
 
     trees: Records1[Tree]
-    """(H,) Gaussians."""
+    """(H,) Gaussian bodies."""
     views: Records2[View]
-    """(H, C) memory of each camera."""
+    """(H, C) state of each camera."""
     noise: Records3[Noise]
     """(H, J, C) learnt measurement noise."""
     n_alive: Ints
     """(1,) number of hypotheses in use."""
     since_search_s: Floats
-    """(1,) time since other hypotheses were last searched for [s]."""
+    """(1,) time since the last search for alternative hypotheses [s]."""
     pace: Records1[Pace]
     """(1,) recent speed of the heaviest hypothesis."""
 
 
 class BoneLengths(NamedTuple):
-    """Distances from joints to their parents, one entry for each joint."""
+    """Distances from joints to their parents."""
 
     mean_m: Floats
-    """(J,) mean lengths [m]; 1 at the root."""
+    """(J,) mean lengths [m]; 1 for the root."""
     variance_m2: Floats
-    """(J,) their variances [m^2]."""
+    """(J,) variances of the lengths [m^2]."""
 
 
 def make_bone_prior() -> BoneLengths:
-    """Return the lengths of bones over the population."""
+    """Return the means and variances of bone lengths in the population."""
     length = np.array([1.0 if k < 0 else BONE_LENGTH_M[k] for k in EDGE_BONE])
     return BoneLengths(length, (POPULATION_SHARE * length) ** 2)
 
@@ -326,11 +338,11 @@ def make_bone_prior() -> BoneLengths:
 def make_hypotheses(
     batch: int, n_workers: int, n_cameras: int, config: ParticleConfig
 ) -> Hypotheses:
-    """Return one hypothesis at the prior for every worker.
+    """Return a state with one hypothesis at the prior for every worker.
 
     Args:
         batch: number of environments B.
-        n_workers: number of workers W in each.
+        n_workers: number of workers W in each environment.
         n_cameras: number of cameras C.
         config: settings of the estimator.
     """
@@ -348,7 +360,7 @@ def make_hypotheses(
 
 
 def reset_hypotheses(state: Hypotheses, ids: Ints, config: ParticleConfig) -> None:
-    """Put the workers of environments `ids` back to the prior.
+    """Reset the workers of environments `ids` to the prior.
 
     Args:
         state: hypotheses of all environments, changed in place.

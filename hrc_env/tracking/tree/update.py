@@ -1,13 +1,15 @@
-"""Update: a tree given one frame, which is one exact linear-Gaussian update about the mode.
+"""Update of a tree by one set of frames, as an exact linear-Gaussian update about the mode.
 
-Cameras inform single joints, bones inform edges, so that the posterior is again a Gaussian on the
-same tree: elimination from the leaves to the root and substitution back give its marginals and
-slopes. Then the means move from the mode to the mean, and lengths of bones are learnt.
+Measurements of cameras concern single joints, and bone lengths concern edges. Therefore the
+posterior is a Gaussian on the same tree: elimination from the leaves to the root and back
+substitution compute its marginals and slopes. The estimate is then shifted from the mode to the
+mean.
 
-Where several views agree with each other and not with the prediction, it was too sure: a limb was
-jerked, a person turned over. The part R of a joint's covariance C that is not its parent's then
-grows, and the pose is searched for again. With d from the predicted joint to where it is seen, R
-is multiplied by 1 + (|d|^4 - d'C d) / d'R d: the variance along d is then |d|^2, the likeliest
+If several views agree with each other but not with the prediction, the predicted covariance was too
+small, for example because a person jerked a limb or rolled over. In this case, the conditional part
+R of a joint's covariance C given its parent is increased, and the search for the pose is repeated.
+With the vector d from the predicted joint to the measured one, R is multiplied by
+1 + (|d|^4 - d'C d) / d'R d. The variance along d is then |d|^2, its maximum-likelihood value
 (covariance matching: Mehra, IEEE Trans. Automatic Control 17, 1972, doi:10.1109/TAC.1972.1100100).
 """
 
@@ -34,13 +36,15 @@ from hrc_env.tracking.tree.search import A0, A1, A2, B0, B1, B2, NEARNESS, find_
 from hrc_env.tracking.tree.state import Tree, Work
 
 _FAR = 16.0
-"""Squared Mahalanobis distance of a jump: by chance a joint is as far once in 900 updates."""
+"""Squared Mahalanobis distance above which a joint is considered to have jumped; by chance, a joint
+exceeds it once in 900 updates."""
 _SURE_VIEWS = 1.5
-"""Sum of the views' weights above which the pose that was found counts as a joint's place."""
+"""Sum of a joint's inlier probabilities above which its position in the found pose is trusted."""
 _AGREEING_VIEWS = 3
-"""Views that must agree on a joint's place otherwise: two may err alike."""
+"""Number of views that must agree on a joint's position otherwise, because two may have the same
+error."""
 _NEAREST_M = 0.3
-"""Least depth of a joint in the correction of the mean [m]."""
+"""Lower bound of a joint's depth in the correction of the mean [m]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
@@ -53,16 +57,16 @@ def condition_on_frame(
     settings: Settings,
     work: Work,
 ) -> float:
-    """Condition a predicted tree on a frame and return the frame's log-evidence.
+    """Condition a predicted tree on one set of frames and return their log-evidence.
 
     Args:
         tree: the predicted hypothesis, changed in place.
-        prior: (1,) receives the prediction, if the frame is weighed.
-        is_weighed: whether the evidence is wanted; 0 is returned otherwise.
-        frame: the measurements; its weights and images are written.
+        prior: (1,) copy of the prediction, filled in if `is_weighed`.
+        is_weighed: whether to compute the evidence; otherwise 0 is returned.
+        frame: the measurements; inlier probabilities and images are filled in.
         settings: settings of the estimator.
-        work: scratch; `predicted`, the position covariances before the update, and `n_views` are
-            for `learning`.
+        work: work arrays; `predicted`, the position covariances before the update, and `n_views`
+            are filled in for `learning`.
     """
     evidence = 0.0
     if is_weighed:
@@ -75,7 +79,7 @@ def condition_on_frame(
     if widen_jumped_joints(tree, frame, settings, work):
         find_pose(tree, frame, settings, work)
     update_tree(tree, work)
-    if is_weighed:  # the mean correction needs the factors that the evidence leaves alone
+    if is_weighed:  # before the correction of the mean; it keeps the factors in `work`
         evidence = log_evidence(prior[0], tree, frame, settings, work)
     correct_mean(tree, frame, settings, work)
     return evidence
@@ -87,15 +91,15 @@ def widen_jumped_joints(tree: Tree, frame: Frame, settings: Settings, work: Work
 
     Args:
         tree: the predicted hypothesis, changed in place.
-        frame: the measurements, with weights as `find_pose` leaves them.
+        frame: the measurements, with inlier probabilities from `find_pose`.
         settings: settings of the estimator.
-        work: scratch, as `find_pose` leaves it.
+        work: work arrays with the results of `find_pose`.
     """
     cov, growth, has_jumped = tree.cov, work.moved, False
     use, point, spread = np.empty(len(frame.P), np.bool_), np.empty(3), np.empty((3, 3))
     for j in ORDER:
         growth[j] = 0.0
-        if has_jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
+        if has_jumped and PARENT[j] >= 0:  # descendants move with a joint that jumped
             multiply(tree.slope[j], growth[PARENT[j]], work.a)
             multiply_transposed(work.a, tree.slope[j], growth[j])
         if _find_jump(j, tree, frame, settings, work, point, spread, use):
@@ -120,47 +124,51 @@ def _find_jump(
     spread: Floats,
     use: Bools,
 ) -> bool:
-    """Return whether views agree on another place of a joint than the predicted one.
+    """Return whether cameras agree on a position of a joint far from the predicted one.
+
+    If the fitted pose is supported by enough cameras, its position counts. If not, they may agree
+    on another one, which is triangulated: its covariance and the prediction's are added.
 
     Args:
-        j: the joint.
-        tree: the predicted hypothesis.
-        frame: the measurements, with weights.
+        j: index of the joint.
+        tree: the predicted hypothesis, in the world frame.
+        frame: the measurements, with the weights `belief` (J, C) as `find_pose` leaves them.
         settings: settings of the estimator.
-        work: scratch with the pose that was found.
-        point: (3,) receives the place [m].
-        spread: (3, 3) scratch.
-        use: (C,) scratch.
+        work: `point` (J, 3) is the fitted pose [m]; the matrix `c` is overwritten.
+        point: (3,) receives the position [m]; meaningless if False is returned.
+        spread: (3, 3) scratch for the covariance of a triangulated position [m^2].
+        use: (C,) scratch for the cameras that agree.
     """
-    ok, body, cov = frame.ok[j], tree.body[j], tree.cov[j]
-    n_believed = 0.0
+    ok, predicted, predicted_cov = frame.ok[j], tree.body[j], tree.cov[j]
+    scratch = work.c
+    n_supporting = 0.0  # a sum of weights
     for c in range(len(ok)):
-        n_believed += frame.belief[j, c] if ok[c] else 0.0
-    if n_believed > _SURE_VIEWS:
+        n_supporting += frame.belief[j, c] if ok[c] else 0.0
+    if n_supporting > _SURE_VIEWS:
         for i in range(3):
             point[i] = work.point[j, i]
-        return _is_far(point, body, cov, work.c)
+        return _is_far(point, predicted, predicted_cov, scratch)
     if ok.sum() < _AGREEING_VIEWS:
         return False
-    gate = settings.gate_sigma
-    z, sigma = frame.z[j], frame.sigma[j]
-    if consensus_point(frame.P, z, sigma, ok, gate, point, spread, use) < _AGREEING_VIEWS:
+    pixels, sigma, gate = frame.z[j], frame.sigma[j], settings.gate_sigma
+    n_agreeing = consensus_point(frame.P, pixels, sigma, ok, gate, point, cov=spread, use=use)
+    if n_agreeing < _AGREEING_VIEWS:
         return False
     for i in range(3):
         for k in range(3):
-            spread[i, k] += cov[i, k]
-    return _is_far(point, body, spread, work.c)
+            spread[i, k] += predicted_cov[i, k]  # the covariance of the difference
+    return _is_far(point, predicted, spread, scratch)
 
 
 @kernel
 def _is_far(point: Floats, body: Floats, cov: Floats, inverse: Floats) -> bool:
-    """Return whether a place counts as a jump.
+    """Return whether a position is far enough from the predicted one for a jump.
 
     Args:
-        point: (3,) the place [m].
+        point: (3,) the position [m].
         body: (3+,) predicted position [m].
         cov: (3+, 3+) covariance of the difference [m^2].
-        inverse: (3+, 3+) scratch.
+        inverse: (3+, 3+) work array.
     """
     invert3(cov, inverse)
     squared = 0.0
@@ -172,13 +180,13 @@ def _is_far(point: Floats, body: Floats, cov: Floats, inverse: Floats) -> bool:
 
 @kernel
 def _widen_joint(j: int, tree: Tree, point: Floats, work: Work) -> bool:
-    """Make the predicted variance of a joint as large as its jump; return whether it grew.
+    """Compute the increase of a joint's covariance that matches a jump; return whether it grows.
 
     Args:
-        j: the joint.
+        j: index of the joint.
         tree: the predicted hypothesis.
-        point: (3,) the place to which the joint has jumped [m].
-        work: scratch; `moved` receives the growth.
+        point: (3,) the position to which the joint has jumped [m].
+        work: work arrays; the increase is added to `moved`.
     """
     q: int = PARENT[j]
     body, cov, inherited = tree.body[j], tree.cov[j], work.b
@@ -209,7 +217,7 @@ def _widen_joint(j: int, tree: Tree, point: Floats, work: Work) -> bool:
 def update_tree(tree: Tree, work: Work) -> None:
     """Condition a tree on cameras and bones, in place.
 
-    `work` is as `find_pose` leaves it; the factors stay in it for `shift_to_mean`.
+    `work` must contain the results of `find_pose`; the factors remain in it for `shift_to_mean`.
     """
     body, cov, slope = tree.body, tree.cov, tree.slope
     for j in LEAVES_FIRST:
@@ -232,13 +240,14 @@ def update_tree(tree: Tree, work: Work) -> None:
 
 @kernel
 def _add_information(j: int, cov: Floats, slope: Floats, work: Work) -> None:
-    """Write the information of the prediction, the cameras and the bone about a joint.
+    """Compute the information of the prediction, the cameras and the bone about a joint.
 
     Args:
-        j: the joint.
+        j: index of the joint.
         cov: (J, 6, 6) predicted covariances.
-        slope: (J, 6, 6) predicted slopes; 0 is written where an edge has to be cut.
-        work: scratch; the joint's `precision`, `coupling`, `back` and `known` are written.
+        slope: (J, 6, 6) predicted slopes; the joint's slope is set to 0 if its conditional
+            covariance is not positive definite.
+        work: work arrays; the joint's `precision`, `coupling`, `back` and `known` are filled in.
     """
     own, rest, shared = work.precision[j], work.a, work.b
     if PARENT[j] >= 0:
@@ -246,7 +255,7 @@ def _add_information(j: int, cov: Floats, slope: Floats, work: Work) -> None:
     for i in range(6):
         for k in range(6):
             rest[i, k] = cov[j, i, k] - (shared[i, k] if PARENT[j] >= 0 else 0.0)
-    if not invert(rest, own):  # cut the edge rather than believe it
+    if not invert(rest, own):  # cut the edge, because its covariance is invalid
         slope[j] = 0.0
         own[:] = 0.0
         for i in range(6):
@@ -267,7 +276,7 @@ def _add_information(j: int, cov: Floats, slope: Floats, work: Work) -> None:
 
 @kernel
 def _eliminate(j: int, slope: Floats, work: Work) -> None:
-    """Write a joint's posterior slope and inverse Hessian; pass its information to the parent."""
+    """Compute a joint's posterior slope and inverse Hessian; pass its information to the parent."""
     hessian, message = work.a, work.b
     q: int = PARENT[j]
     for i in range(6):
@@ -284,13 +293,13 @@ def _eliminate(j: int, slope: Floats, work: Work) -> None:
 
 @kernel
 def _marginalise(j: int, cov: Floats, slope: Floats, work: Work) -> None:
-    """Write a joint's marginal covariance, C_j = inverse Hessian + B_j C_q B_j'.
+    """Compute a joint's marginal covariance, C_j = inverse Hessian + B_j C_q B_j'.
 
     Args:
-        j: the joint; its parent q is done.
-        cov: (J, 6, 6) covariances, written for the joint.
+        j: index of the joint; its parent q must be marginalised already.
+        cov: (J, 6, 6) covariances, filled in for the joint.
         slope: (J, 6, 6) posterior slopes.
-        work: scratch with the inverse Hessians.
+        work: work arrays with the inverse Hessians.
     """
     q: int = PARENT[j]
     if q >= 0:
@@ -309,7 +318,7 @@ def _substitute(body: Floats, slope: Floats, work: Work) -> None:
     Args:
         body: (J, 6) means, changed in place.
         slope: (J, 6, 6) posterior slopes.
-        work: scratch with the factors of the elimination; the gradient is used up.
+        work: work arrays with the factors of the elimination; the gradient is overwritten.
     """
     for j in LEAVES_FIRST:
         q: int = PARENT[j]
@@ -331,19 +340,19 @@ def _substitute(body: Floats, slope: Floats, work: Work) -> None:
 
 @kernel
 def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
-    """Move the means from the mode towards the mean of the posterior (Laplace's next term).
+    """Move the means from the mode to the posterior mean, by the next term of Laplace's method.
 
-    A camera's information falls with the square of the depth: there is more room behind the mode
-    than before it. With J the Jacobian of joint j's pixel, n the camera's optical axis (both in the
-    world), d the depth and S_j the posterior covariance, mean - mode = H^-1 g with g_j = sum over
-    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints in the factors that
-    `update_tree` left.
+    A camera's information decreases with the square of the depth; therefore the posterior extends
+    farther behind the mode than in front of it. With the Jacobian J of joint j's pixel and the
+    camera's optical axis n (both in the world frame), the depth d and the posterior covariance S_j,
+    mean - mode = H^-1 g, where g_j is the sum of n tr(S_j J'J / sigma^2) / d over cameras. H is the
+    Hessian of all joints, of which `update_tree` has left the factors in `work`.
 
     Args:
         tree: the updated hypothesis, changed in place.
-        frame: the measurements, with weights and images.
+        frame: the measurements, with inlier probabilities and images.
         share: share of the shift that is applied, 0 to 1.
-        work: scratch, as `update_tree` leaves it.
+        work: work arrays with the results of `update_tree`.
     """
     sigma, ok, belief = frame.sigma, frame.ok, frame.belief
     for j in range(len(ok)):
@@ -366,9 +375,9 @@ def _find_pixel_variance(image: Floats, j: int, cov: Floats) -> float:
     """Return the sum of the variances of both coordinates of a joint's pixel [px^2].
 
     Args:
-        image: (N_IMAGE, LANES) the joints in one camera.
-        j: the joint.
-        cov: (3+, 3+) covariance of its position [m^2].
+        image: (N_IMAGE, LANES) linearised projections of the joints in one camera.
+        j: index of the joint.
+        cov: (3+, 3+) covariance of the joint's position [m^2].
     """
     a0, a1, a2 = image[A0, j], image[A1, j], image[A2, j]
     b0, b1, b2 = image[B0, j], image[B1, j], image[B2, j]
@@ -380,13 +389,13 @@ def _find_pixel_variance(image: Floats, j: int, cov: Floats) -> float:
 
 @kernel
 def correct_mean(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
-    """Move from the mode to the mean; update ages, conflicts and the numbers of views.
+    """Move the means from the mode to the mean; update ages, conflicts and numbers of views.
 
     Args:
         tree: the updated hypothesis, changed in place.
-        frame: the measurements, with weights and images.
+        frame: the measurements, with inlier probabilities and images.
         settings: settings of the estimator.
-        work: scratch, as `update_tree` leaves it; `n_views` is written.
+        work: work arrays with the results of `update_tree`; `n_views` is filled in.
     """
     if settings.mean_correction > 0.0:
         shift_to_mean(tree, frame, settings.mean_correction, work)
@@ -402,13 +411,16 @@ def correct_mean(tree: Tree, frame: Frame, settings: Settings, work: Work) -> No
 
 @kernel
 def count_conflict(n_ok: int, n_supporting: int, conflict: int) -> int:
-    """Return the number of updates in a row in which a joint's views contradict its estimate.
+    """Return the number of successive updates in which views contradict the estimate of a joint.
+
+    It increases if at least two cameras measured the joint and at most one of them supports the
+    estimate. It is reset to 0 if at least two cameras support the estimate or no camera measured
+    the joint, and does not change if a single camera measured the joint.
 
     Args:
         n_ok: number of cameras that measured the joint.
-        n_supporting: number of those that support the estimate; two or more end the row, and so
-            does a joint that no camera measured.
-        conflict: the number before this update; it stays with one view that does not support.
+        n_supporting: number of these cameras that support the estimate.
+        conflict: the number before this update.
     """
     if n_ok < 2 or n_supporting >= 2:
         return 0 if n_supporting >= 2 or n_ok == 0 else conflict

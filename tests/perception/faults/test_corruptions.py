@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assets.workers.poses import rest_motion
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.records import Roi
 from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, ScenePose, Shot
 from hrc_env.perception.faults.corruptions import CropView, corrupt
@@ -107,7 +107,7 @@ class FakeStage:
 
 def film(*faults):
     body = load_body("worker_1")
-    motions = [mapped(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
+    motions = [map_arrays(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
     motions[0].position_world[..., 0], motions[1].position_world[..., 0] = 0.4, 0.8
     rig = make_cameras(LAB_CAMERAS)
     shown = CameraFilm(LensRenderer(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))

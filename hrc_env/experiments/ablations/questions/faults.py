@@ -1,4 +1,4 @@
-"""Ablations of late images and of miscalibrated cameras."""
+"""Ablations of delayed images and of miscalibrated cameras."""
 
 import math
 from typing import NamedTuple
@@ -10,8 +10,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 LATE_MS = (40, 80, 120, 200, 320)
-"""Latencies that are multiples of the control step, in which images come (320 instead of 300)
-[ms]."""
+"""Latencies of images [ms], which are multiples of the control step (320 instead of 300)."""
 LATENCY = Ablation(
     "latency",
     "How late may images be?",
@@ -38,15 +37,15 @@ class Miscalibration(NamedTuple):
     """A kind of calibration error, and its amounts."""
 
     words: str
-    """Description in tables."""
+    """Description of the error in tables."""
     unit: str
     """Unit of amounts in tables."""
     short: str
-    """Unit of amounts in names."""
+    """Unit of amounts in names of settings."""
     scale: float
-    """Amount of the fault for one such unit."""
+    """Amount of the fault that corresponds to one unit."""
     amounts: tuple[float, ...]
-    """Amounts, in that unit."""
+    """Amounts in the unit of tables."""
 
 
 KINDS = {
@@ -60,7 +59,7 @@ AFFECTED = {"one": "one camera", "all": "all cameras"}
 
 
 def _miscalibrate(affected: str, name: str, amount: float, scene: str = "lab") -> Setting:
-    """Return a setting in which one camera, in turns, or all of them have a calibration error."""
+    """Return a setting in which one camera at a time, or all cameras, have a calibration error."""
     kind = KINDS[name]
     names = [(camera.name,) for camera in RIGS[scene]] if affected == "one" else [(EVERY,)]
     faults = [FaultConfig(f"wrong_{name}", cameras, amount * kind.scale) for cameras in names]

@@ -34,7 +34,7 @@ class Variant(NamedTuple):
     """A variant of the default filter, or another estimator."""
 
     words: str
-    """Description in tables."""
+    """Description of the variant in tables."""
     changes: dict[str, Any]
     """Changed fields of `Setting` or of the tracker's settings."""
 
@@ -72,14 +72,14 @@ OF_ONE_VIEW = (
     "no widening", "one hypothesis", "no turned body", "no limbs", "no anatomy",
     "no walking direction", "evidence in full", "4 hypotheses", "16 hypotheses",
 )  # fmt: skip
-"""Variants that differ from the default with one camera only."""
+"""Variants that differ from the default filter only with one camera."""
 
 
 class CameraChoice(NamedTuple):
     """A number of cameras, and the rigs over which episodes rotate."""
 
     words: str
-    """Description in tables."""
+    """Description of the choice in tables."""
     rigs: tuple[Rig, ...]
     """Cameras that work after the warm-up."""
 
@@ -121,10 +121,10 @@ FILTER = Ablation(
 
 
 class BodyKnowledge(NamedTuple):
-    """An estimator, and its knowledge of bone lengths."""
+    """An estimator and its knowledge of bone lengths."""
 
     words: str
-    """Description in tables."""
+    """Description of the estimator in tables."""
     estimator: str
     bones: str
     """One of `handicaps.BONES`."""
@@ -136,7 +136,7 @@ KNOWING = {
     "none": BodyKnowledge("bones of any length", "particle", "none"),
     "points": BodyKnowledge("points without a body (ransac)", "ransac", "learnt"),
 }
-"""Kinds of knowledge by name."""
+"""Kinds of knowledge of the body, by name."""
 KINEMATICS = Ablation(
     "kinematics",
     "Effect of a model of the body",

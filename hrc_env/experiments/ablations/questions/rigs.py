@@ -1,4 +1,4 @@
-"""Ablations of the number and places of cameras, of occlusion, and of several workers."""
+"""Ablations of the number and positions of cameras, of occlusion, and of several workers."""
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.rigs import (
@@ -16,33 +16,35 @@ from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 
 X_M, Y_M = 2.9, 2.6
-"""Distances of cameras from the laboratory's middle along x and y [m]."""
+"""Distances of cameras from the centre of the laboratory along x and y [m]."""
 UNDER_CEILING_M, BREAST_M = 2.45, 1.0
 """Heights of cameras above the floor [m]."""
 BESIDE_M = 0.5
-"""Distance between two cameras that are beside each other [m]."""
+"""Distance between two cameras that are next to each other [m]."""
 Place = tuple[float, float]
 """Position x, y of a camera [m]."""
 CORNERS: tuple[Place, ...] = ((X_M, Y_M), (-X_M, Y_M), (-X_M, -Y_M), (X_M, -Y_M))
 WALLS: tuple[Place, ...] = ((0.0, Y_M), (-X_M, 0.0), (0.0, -Y_M), (X_M, 0.0))
 ROUND = tuple(place for pair in zip(CORNERS, WALLS, strict=True) for place in pair)
-"""Eight places around the room, corners and middles of walls in turns."""
+"""Eight positions around the room, alternating between corners and centres of walls."""
 PAIRS: tuple[Rig, ...] = (NEIGHBOURS[0], OPPOSITE[0], NEIGHBOURS[1], OPPOSITE[1])
-"""Two diagonals and two neighbours, so that no result depends on one arrangement."""
+"""Two pairs of opposite and two of neighbouring cameras, so that no result depends on one
+arrangement."""
 
 
 def make_cameras(
     places: tuple[Place, ...], height_m: float = UNDER_CEILING_M
 ) -> tuple[CameraConfig, ...]:
-    """Return cameras at places, all at one height, that look at the shared space."""
+    """Return cameras at the given positions and height, which are aimed at the shared space."""
     numbered = enumerate(places, 1)
     return tuple(CameraConfig(f"place_{k}", (x, y, height_m)) for k, (x, y) in numbered)
 
 
 def spread_cameras(n_cameras: int) -> tuple[Turn, ...]:
-    """Return all choices of some of the eight places, as evenly around the room as possible.
+    """Return all rigs at some of the eight positions, spread around the room as evenly as possible.
 
-    One camera is one that remains of four in the corners, or on the walls, after the warm-up.
+    A single camera is one of four in the corners or on the walls, of which the others fail after
+    the warm-up.
     """
     if n_cameras == 1:
         return tuple(
@@ -57,7 +59,7 @@ def spread_cameras(n_cameras: int) -> tuple[Turn, ...]:
 
 
 def place_along_walls() -> tuple[Turn, ...]:
-    """Return four cameras along one wall, for each wall."""
+    """Return rigs of four cameras along one wall, one rig for each wall."""
     along = [-1.0, -1 / 3, 1 / 3, 1.0]
     sides = [tuple((X_M * a, y) for a in along) for y in (Y_M, -Y_M)]
     sides += [tuple((x, Y_M * a) for a in along) for x in (X_M, -X_M)]
@@ -65,13 +67,13 @@ def place_along_walls() -> tuple[Turn, ...]:
 
 
 def place_side_by_side() -> tuple[Turn, ...]:
-    """Return two cameras side by side along a wall in a corner, for each corner."""
+    """Return rigs of two cameras side by side along a wall, one rig for each corner of the room."""
     pairs = (((x, y), (x - BESIDE_M * (1 if x > 0 else -1), y)) for x, y in CORNERS)
     return tuple(Turn(make_cameras(pair)) for pair in pairs)
 
 
 def _select_corners(rigs: tuple[Rig, ...]) -> tuple[Turn, ...]:
-    """Return turns with cameras in some of the corners."""
+    """Return one turn with cameras in the given corners for each rig."""
     return tuple(Turn(make_cameras(tuple(CORNERS[c] for c in rig))) for rig in rigs)
 
 
