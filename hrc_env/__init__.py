@@ -1,8 +1,9 @@
-"""hrc_env: learn to work beside people whom a robot sees through cameras only.
+"""hrc_env: learning of robots that work beside people and observe them only by cameras.
 
-Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")`
-does both. `PUBLIC` lists the names for users, with the modules that define them; they are imported
-when they are first used. Everything else may change without notice.
+Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")` imports
+the package and makes an environment. `PUBLIC` lists the names of the public interface and the
+modules that define them; a name is imported when it is first used. Everything else may change
+without notice.
 """
 
 import difflib
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from hrc_env.registration import adopt, import_files, register_environment
 from hrc_env.tasks import BUILT_IN
 
-if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
+if TYPE_CHECKING:  # the names in `PUBLIC`, for type checkers and editors
     from hrc_env.agents.callbacks import ProximityRamp as ProximityRamp
     from hrc_env.agents.env_info import Agent as Agent
     from hrc_env.agents.env_info import EnvInfo as EnvInfo
@@ -240,23 +241,23 @@ PUBLIC = {
     "HRCError": "hrc_env.core.errors",
     "import_files": "hrc_env.registration",
 }
-"""Public names, and the modules that define them."""
+"""Modules that define the public names, by name."""
 RENAMED = {
     "pinholes": "make_cameras",
     "read_capture": "read_recording",
     "sample_window": "crop_window",
 }
-"""Former public names, and the present ones."""
+"""Present public names, by their former names."""
 EXTRAS = dict.fromkeys(("HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"), "stable_baselines3")
-"""Public names that need a package which an extra installs."""
+"""Packages that some public names need and that an extra installs, by name."""
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used (PEP 562); `help` of a class shows its fields.
+    """Import a public name when it is first used (PEP 562), and show a class's fields in `help`.
 
     Raises:
-        AttributeError: there is no such name, with the nearest one, or it is a former one, with the
-            present one.
+        AttributeError: the name is unknown, or it is a former name; the error suggests the most
+            similar name or the present one.
     """
     if name in PUBLIC:
         value = globals()[name] = getattr(import_module(PUBLIC[name]), name)
@@ -272,14 +273,15 @@ def __getattr__(name: str) -> Any:
 
 
 class FormerNames:
-    """A finder of `sys.meta_path`: lets `from hrc_env import FORMER` show the present name.
+    """A finder for `sys.meta_path` that makes `from hrc_env import FORMER` show the present name.
 
-    Python asks it for a module of that name, and would not show an `AttributeError`.
+    If `__getattr__` raises an `AttributeError`, Python does not show it but looks for a submodule
+    of that name.
     """
 
     @staticmethod
     def find_spec(fullname: str, path: object = None, target: object = None) -> None:
-        """Raise the `ImportError` of a former name; find no module of any other."""
+        """Raise an `ImportError` for a former name; return None for every other name."""
         package, _, name = fullname.partition(".")
         if package == __name__ and name in RENAMED:
             raise ImportError(_said_of(name), name=fullname)
@@ -290,7 +292,7 @@ def _said_of(former: str) -> str:
 
 
 def __dir__() -> list[str]:
-    """List the public names; those of an extra only where it is installed."""
+    """List the public names; those that need an extra are listed only if it is installed."""
     here = [name for name in PUBLIC if name not in EXTRAS or find_spec(EXTRAS[name])]
     return [*here, "__version__"]
 

@@ -1,6 +1,6 @@
-"""python -m hrc_env: set up, look, play, learn, measure.
+"""The command line, `python -m hrc_env`: set up, play, train and evaluate.
 
-A command's own file is imported when it is called, so that this one answers at once.
+The module of a command is imported only when the command is called, which keeps the start fast.
 """
 
 import platform
@@ -66,20 +66,20 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
     ),
 }  # fmt: skip
-"""Each command: its module, its class, and the class's first sentence."""
+"""Module, class and first sentence of the class's docstring, by command."""
 MOVED = {
     "bench": "python -m benchmarks",
     "gallery": "python -m benchmarks gallery",
     "calibrate-keypoints": "python -m assets.emulator.calibrate",
 }
-"""Former commands, and what they are called in a clone of the repository."""
+"""Commands in a clone of the repository that replace former commands, by their former names."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Run a command, and show errors of the package without a traceback.
 
     Args:
-        words: the command and its options; None for those of this process.
+        words: the command and its options; None for the arguments of this process.
 
     Returns:
         The exit status: 2 for a wrong command or option, 130 after Ctrl-C.
@@ -95,7 +95,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def overview() -> str:
-    """Return the help of the program: its commands by name."""
+    """Return the help text of the program, which lists its commands."""
     commands = "\n".join(
         textwrap.fill(f"  {name:21s}{purpose}", 80, subsequent_indent=" " * 23)
         for name, (_, _, purpose) in COMMANDS.items()

@@ -1,4 +1,7 @@
-"""The belief of a robot in one step: itself, its task and the estimate, but never the truth."""
+"""The belief of a robot in one step: its own state, its task and the estimate of the workers.
+
+It never contains the truth about the workers.
+"""
 
 import math
 import threading
@@ -22,42 +25,42 @@ from hrc_env.geometry.distances import (
 from hrc_env.geometry.robot_model import RobotModel
 
 PERSON_M = 0.5
-"""Greatest distance from a person's hips of the floor that the person takes up [m]."""
+"""Radius around a person's hips of the patch of floor that the person occupies [m]."""
 NEAR_FLOOR_M = 1.5
-"""Distance from a robot beyond which floor does not matter [m]."""
+"""Distance from a robot beyond which unseen floor is ignored [m]."""
 _LAST = threading.local()
-"""The last belief that was lent in each thread."""
+"""The last belief that was passed to a user's function, in each thread."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnseenFloor:
-    """The floor on which a person without a track may be.
+    """The patches of floor on which a person without a track may be.
 
-    It is that of unknown slots without a last sighting, and of people beyond the slots.
+    They belong to unknown slots without a last sighting, or to people in excess of the slots.
     """
 
     floor_world: Points3
-    """(N, 3) centres of pieces of floor [m]."""
+    """(N, 3) centres of the patches of floor [m]."""
     piece_m: float
-    """Distance of a piece's centre from its corners [m]."""
+    """Distance between the centre of a patch and its corners [m]."""
     level: Ints
-    """(B, N) state of each piece: `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    """(B, N) state of each patch: `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
     age_s: Floats
-    """(B,) age of the oldest image behind these states [s]."""
+    """(B,) age of the oldest image from which these states were determined [s]."""
     possible_m: Floats
-    """(B,) distance of the robot's surface from the space above the nearest `POSSIBLE` piece [m];
-    infinite beyond `NEAR_FLOOR_M`."""
-    probable_m: Floats
-    """(B,) distance of the robot's surface from the space above the nearest `PROBABLY_EMPTY` piece
+    """(B,) distance between the robot's surface and the space above the nearest `POSSIBLE` patch
     [m]; infinite beyond `NEAR_FLOOR_M`."""
+    probable_m: Floats
+    """(B,) distance between the robot's surface and the space above the nearest `PROBABLY_EMPTY`
+    patch [m]; infinite beyond `NEAR_FLOOR_M`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """All information that a robot may have in one step."""
+    """All information that is available to a robot in one step."""
 
     robot: RobotState
-    """Joints, tool and surface of the robot, measured by its own encoders."""
+    """Joints, tool and surface of the robot, as measured by the robot's encoders."""
     estimate: PoseEstimate
     """(B, W, ...) estimate of the workers from the cameras' images."""
     separation: Separation
@@ -67,28 +70,28 @@ class Belief:
     action: Floats
     """(B, A) last action of the agent, in [-1, 1], before any shield."""
     hand: HandState | None = None
-    """State of the gripper; None: the robot has none."""
+    """State of the gripper; None if the robot has none."""
     objects: ObjectState | None = None
-    """Measured state of the task's loose objects; None: there are none."""
+    """Measured state of the task's loose objects; None if there are none."""
     forecast: tuple[PoseEstimate, ...] = ()
-    """Estimates of the workers at each of the times `HRCConfig.forecast_s` ahead."""
+    """Forecasts of the workers' poses, one for each horizon in `HRCConfig.forecast_s`."""
     command: JointVelocities | None = None
-    """(B, N) present command of the joint velocities [rad/s]."""
+    """(B, N) current command of the joint velocities [rad/s]."""
     shield_change: JointVelocities | None = None
-    """(B, N) joint velocities of the shield in the last step less those of the agent [rad/s]; 0
-    without a shield."""
+    """(B, N) joint velocities that the shield allowed in the last step minus those that the agent
+    commanded [rad/s]; 0 without a shield."""
     model: RobotModel | None = None
-    """Geometry, limits and masses of the robot, which do not change."""
+    """Geometry, limits and masses of the robot, which are constant."""
     allowed_contact: Bools | None = None
-    """(B, W, S) whether each segment of an estimated body may touch the robot's hand; None: no
+    """(B, W, S) whether each segment of an estimated body may touch the robot's hand; None if no
     segment may."""
     unseen: UnseenFloor | None = None
-    """Floor on which an undetected person may be; None: the whole floor."""
+    """Floor on which an undetected person may be; None for the whole floor."""
 
 
 def lend_belief(belief: Belief) -> Belief:
-    """Return a belief with read-only arrays, for functions of users."""
-    if getattr(_LAST, "belief", None) is not belief:  # several terms are given the same one
+    """Return a view of a belief with read-only arrays, for functions that users provide."""
+    if getattr(_LAST, "belief", None) is not belief:  # several terms receive the same belief
         _LAST.lent = read_only(belief, constants=("model",))
         _LAST.belief = belief
     return _LAST.lent
@@ -97,7 +100,8 @@ def lend_belief(belief: Belief) -> Belief:
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
     """Return the smallest gap (B, W) between a robot and each estimated body, hands included.
 
-    It is infinite for a worker without a track; `PoseEstimate.unknown` is whether one may be near.
+    It is infinite for a worker without a track; `PoseEstimate.unknown` marks those that may be
+    near.
     """
     bodies = segments(estimate.mean_world)
     nearest = least_separation(
@@ -109,17 +113,17 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
 def find_unseen_floor(
     robot: RobotState, estimate: PoseEstimate, vacancy: Vacancy | None
 ) -> UnseenFloor | None:
-    """Find the floor that was not seen empty, and its distance from each robot.
+    """Find the floor that was not observed to be empty, and its distance from each robot.
 
-    Unknown slots without a last sighting count, and people beyond the slots.
+    Unknown slots without a last sighting are considered, and people in excess of the slots.
 
     Args:
         robot: (B, ...) state of the robots.
-        estimate: (B, W, ...) the estimate.
-        vacancy: state of the floor; None: there are no cameras.
+        estimate: (B, W, ...) estimate of the workers.
+        vacancy: state of the floor; None without cameras.
 
     Returns:
-        The floor; None without cameras.
+        The unseen floor; None without cameras.
     """
     if vacancy is None:
         return None
@@ -138,7 +142,7 @@ def find_unseen_floor(
 
 
 def drop_distant_unknown(estimate: PoseEstimate, unseen: UnseenFloor | None) -> PoseEstimate:
-    """Return an estimate in which slots are unknown only if an undetected person may be near."""
+    """Return an estimate in which a slot is unknown only if an undetected person may be near."""
     if unseen is None:
         return estimate
     far = np.isinf(unseen.possible_m) & np.isinf(unseen.probable_m)
@@ -147,12 +151,12 @@ def drop_distant_unknown(estimate: PoseEstimate, unseen: UnseenFloor | None) -> 
 
 
 def _never_seen(estimate: PoseEstimate) -> Bools:
-    """Return the slots (B, W) without a last sighting."""
+    """Return a mask (B, W) of the slots without a last sighting."""
     return np.isnan(estimate.seen_world[..., 0, 0])
 
 
 def _reachable(others: Others, coverage: Coverage) -> Bools:
-    """Return the pieces of floor (B, N) where people beyond the slots may be by now."""
+    """Return a mask (B, N) of the patches that people in excess of the slots may have reached."""
     off_xy_m = coverage.floor_world[:, None, :2] - others.hips_world[:, None, :, :2]
     reach_m = PERSON_M + WALKING_M_S * np.where(np.isinf(others.age_s), 0.0, others.age_s)
     return (np.linalg.norm(off_xy_m, axis=-1) < reach_m[:, None]).any(-1)
@@ -162,15 +166,15 @@ def _reachable(others: Others, coverage: Coverage) -> Bools:
 def _find_nearest_floor(
     capsules: Capsules, radius: Floats, floor: Points3, piece_m: float, level: Ints, gaps: Floats
 ) -> None:
-    """Write the gaps between robots and the space above the floor of each level.
+    """Compute the gaps between robots and the space above the nearest patch of each state.
 
     Args:
-        capsules: (B, K, 2, 3) the robots' capsules [m].
-        radius: (K,) their radii [m].
-        floor: (N, 3) centres of pieces of floor [m].
-        piece_m: distance of a piece's centre from its corners [m].
-        level: (B, N) state of each piece.
-        gaps: (B, `EMPTY`) is lowered to the gaps [m].
+        capsules: (B, K, 2, 3) capsules of the robots [m].
+        radius: (K,) radii of the capsules [m].
+        floor: (N, 3) centres of the patches of floor [m].
+        piece_m: distance between the centre of a patch and its corners [m].
+        level: (B, N) state of each patch.
+        gaps: (B, `EMPTY`) gaps by state [m], which are lowered in place.
     """
     head = np.empty(3)
     for b in range(len(capsules)):
@@ -189,18 +193,18 @@ def _find_nearest_floor(
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """Return the standard deviation (B, W, J) of each joint [m].
 
-    It is the root of the mean variance over the axes.
+    It is the square root of the variance averaged over the three axes.
     """
     cov = estimate.cov_world
     return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3.0)
 
 
 def deviation_towards_robot_m(robot: RobotState, estimate: PoseEstimate) -> Floats:
-    """Return the standard deviation (B, W, J) of each joint towards the robot [m].
+    """Return the standard deviation (B, W, J) of each joint in the direction of the robot [m].
 
-    It is sqrt(n' C n), with C the joint's covariance and n the unit vector from its mean to the
-    nearest point on the axis of the capsule with the nearest surface. A joint on an axis has no
-    such direction: there it is the root of the mean variance over the axes.
+    It is sqrt(n' C n), where C is the joint's covariance and n the unit vector from its mean to the
+    nearest point on the axis of the robot's nearest capsule. For a joint that lies on this axis, n
+    is undefined, and `standard_deviation_m` is returned.
     """
     points = np.repeat(estimate.mean_world[..., None, None, :], 2, axis=-2)
     nearest = least_separation(robot.capsules_world, robot.capsule_radius_m, points, np.zeros(1))
@@ -214,7 +218,8 @@ def deviation_towards_robot_m(robot: RobotState, estimate: PoseEstimate) -> Floa
 def covariance_factor_m(estimate: PoseEstimate) -> Floats:
     """Return the Cholesky factor L of each covariance L L' [m].
 
-    Unlike principal axes and their deviations, its entries are continuous in the covariance.
+    Unlike principal axes and their standard deviations, its entries are continuous functions of the
+    covariance.
 
     Returns:
         (B, W, J, 6) entries xx, yx, yy, zx, zy, zz.

@@ -1,7 +1,7 @@
-"""The whole configuration: one frozen tree, a branch for each component.
+"""The configuration of an environment: a tree of frozen dataclasses, one for each component.
 
-`HRCConfig()` is the default; `dataclasses.replace`, a nested mapping or a TOML file changes it:
-`gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
+`HRCConfig()` holds the defaults; `dataclasses.replace`, a nested mapping or a TOML file changes
+them: `gymnasium.make("HRCReach-v0", config={"reward": {"proximity": 0.0}})`.
 """
 
 import math
@@ -49,35 +49,36 @@ class HRCConfig:
     ctrl_dt: float = 0.04
     """Duration of a control step [s], a multiple of `scene.sim_dt`; 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = ()
-    """Largest distance of joints from their home angles at a reset [rad]; empty for the robot's."""
+    """Largest deviation of each joint from its home angle at a reset [rad]; empty for the default
+    of the robot."""
     forecast_s: tuple[float, ...] = ()
     """Horizons of the forecast of the workers' joints in the observation, each in (0, 1] [s]; none
-    by default. (0.2, 0.4) adds 120 entries a worker."""
+    by default. (0.2, 0.4) adds 120 entries per worker."""
     uncertainty: tuple[str, ...] = ()
-    """Further entries of the observation about each joint's covariance, beside its root mean:
-    "towards_robot", the deviation along the line to the robot; "factor", all of it as 6 numbers; or
-    both."""
+    """Further entries of the observation that describe the covariance of each joint, in addition to
+    its root mean: "towards_robot", the standard deviation along the line to the robot; "factor",
+    the six entries of its Cholesky factor; or both."""
     observe_shield: bool = False
-    """Whether the observation also has the shield's change of the last command."""
+    """Whether the observation contains the shield's change of the last command."""
     worker: str | tuple[str, ...] = "worker_1"
-    """Baked body of the workers: a name, several names, or "any" for all bodies. Of several bodies,
-    each worker has one in every episode, different from each other as far as possible."""
+    """Body of the workers: a name, several names, or "any" for all bodies. From several bodies, one
+    is assigned to each worker in every episode; they differ from each other as far as possible."""
     scene: SceneConfig = field(default_factory=SceneConfig)
-    """Scene, cameras and physics."""
+    """Settings of the scene, the cameras and the physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
-    """Motion of the workers."""
+    """Settings of the workers' motion."""
     detector: DetectorConfig = field(default_factory=DetectorConfig)
-    """Pose detector (`perception="pixels"`)."""
+    """Settings of the pose detector (`perception="pixels"`)."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
-    """Emulator of the pose detector (`perception="keypoints"`)."""
+    """Settings of the emulator of the pose detector (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
-    """Faults of the cameras, and their times (docs/cameras.md)."""
+    """Faults of the cameras, with the times at which they occur (docs/cameras.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     """Appearance of scene and workers, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)
-    """Settings of the estimator, of the type of `EstimatorSpec.config`."""
+    """Settings of the estimator, an instance of `EstimatorSpec.config`."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
-    """Association of detections with several workers."""
+    """Settings of the association of detections with workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
     """Scaling and limits of actions."""
     objects: ObjectsConfig = field(default_factory=ObjectsConfig)
@@ -115,12 +116,12 @@ class HRCConfig:
 
 
 ConfigChoice: TypeAlias = HRCConfig | Mapping[str, Any] | str | Path | None
-"""Values of `config=`."""
+"""Valid types of the argument `config`."""
 PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
 
 
 def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> HRCConfig:
-    """Return the configuration for a value of `config=`.
+    """Return the configuration for a value of the argument `config`.
 
     Args:
         config: a configuration, a (nested) mapping of changes, the path of a TOML file, or None.
@@ -128,7 +129,8 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
         estimator: the estimator.
 
     Raises:
-        ConfigError: an unknown field, an invalid value, or the settings of another task.
+        ConfigError: a field is unknown, a value is invalid, or the settings are those of another
+            task.
     """
     if isinstance(config, str | Path):
         config = read_toml(config)
@@ -154,10 +156,10 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
 
 
 def save_config(config: HRCConfig, path: str | Path) -> None:
-    """Write every setting to a TOML file, which `config=` and `--config` take.
+    """Write all settings to a TOML file, which `config=` and `--config` accept.
 
     Raises:
-        ConfigError: `motion.motions` has a clip in memory, which a file cannot hold.
+        ConfigError: `motion.motions` contains a clip in memory, which a file cannot hold.
     """
     for motion in config.motion.motions:
         if not isinstance(motion, str):

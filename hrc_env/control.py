@@ -1,9 +1,9 @@
-"""Actions to commands of an arm: joint velocities, or resolved-rate control of the tool.
+"""Conversion of actions to joint velocities, directly or by resolved-rate control of the tool.
 
-Resolved-rate control is the damped least-squares solution of J qd = v (Wampler 1986,
-DOI 10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764). The remaining
-freedom of the joints is used to approach a rest posture. The damping keeps speeds finite near
-singular postures, where the tool then lags behind the command.
+Resolved-rate control is the damped least-squares solution of J qd = v (Wampler 1986, DOI
+10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764). The redundancy of the
+arm is used to approach a rest posture. The damping keeps joint speeds finite near singularities,
+where the tool lags behind the command.
 """
 
 import math
@@ -26,17 +26,17 @@ MEANINGS = {
     "tool": "a velocity of its tool",
     "twist": "velocity and turn rate of its tool",
 }
-"""Meaning of an action, without the entry of a hand, by `control`."""
+"""Meaning of an action without the entry for a hand, by value of `control`."""
 CONTROLS = tuple(MEANINGS)
-"""Values of `control`."""
+"""Valid values of `control`."""
 SINGULAR_M3 = 0.05
-"""Manipulability below which the damping of `twist` fades in."""
+"""Manipulability below which the damping of `twist` increases from zero."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ControlConfig:
-    """Scales of actions, by `control`."""
+    """Scaling of actions, for each value of `control`."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "tool_speed_mps": "tool_speed_m_s",
@@ -45,16 +45,16 @@ class ControlConfig:
     """Present names of fields that were renamed, by their old names."""
 
     joint_speed_share: float = 0.5
-    """Velocity of a joint for an action of 1, as a share of its limit (`joint`)."""
+    """Velocity of a joint for an action of 1, as a fraction of its limit (`joint`)."""
     tool_speed_m_s: float = 0.6
     """Velocity of the tool point along a world axis for an action of 1 (`tool`, `twist`) [m/s]."""
     tool_rotation_rad_s: float = 1.2
-    """Turn rate of the tool about a world axis for an action of 1 (`twist`) [rad/s]."""
+    """Angular velocity of the tool about a world axis for an action of 1 (`twist`) [rad/s]."""
     damping: float = 0.07
     """Damping of the least-squares solution (`tool`, `twist`) [m]."""
     posture_gain_hz: float = 0.8
-    """Gain with which joints return to the rest posture, as far as the tool allows (`tool`)
-    [1/s]."""
+    """Gain with which joints return to the rest posture, as far as the motion of the tool allows
+    (`tool`) [1/s]."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be in (0, 1]", "joint_speed_share")
@@ -67,11 +67,11 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
 
     Args:
         control: "joint" (an entry for each joint), "tool" (three) or "twist" (six).
-        chain: geometry of the robot.
-        grips: whether it has a hand, which takes another entry.
+        chain: kinematics of the robot.
+        grips: whether the robot has a hand, which needs a further entry.
 
     Raises:
-        ConfigError: an unknown control, or one that needs a robot without slides.
+        ConfigError: `control` is unknown, or is not supported by a robot with slides.
     """
     if control not in CONTROLS:
         raise make_unknown_name_error("control", control, CONTROLS)
@@ -84,7 +84,7 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
 
 
 def max_command(control: str, chain: SerialChain, config: ControlConfig) -> JointVelocities:
-    """Return the greatest velocity (N,) that an action can command for each joint [rad/s]."""
+    """Return the maximum velocity (N,) that an action can command for each joint [rad/s]."""
     share = config.joint_speed_share if control == "joint" else 1.0
     return share * chain.velocity_limit_rad_s
 
@@ -94,11 +94,11 @@ def check_action(action: ArrayLike, shape: tuple[int, ...], control: str) -> Flo
 
     Args:
         action: actions of an agent.
-        shape: shape that they must have.
-        control: the environment's `control`, for messages.
+        shape: expected shape.
+        control: the environment's `control`, for error messages.
 
     Raises:
-        ConfigError: another shape, or no finite numbers.
+        ConfigError: the shape differs, or a value is not a finite number.
     """
     try:
         values = np.asarray(action, np.float64)
@@ -128,14 +128,14 @@ def joint_command(
 
     Args:
         control: "joint", "tool" or "twist".
-        action: (B, A) in [-1, 1], without the entry of a hand.
+        action: (B, A) actions in [-1, 1], without the entry for a hand.
         q: (B, N) joint angles [rad].
-        chain: geometry of the robot.
+        chain: kinematics of the robot.
         q_rest: (N,) rest posture [rad].
-        config: scales of actions.
+        config: scaling of actions.
 
     Returns:
-        (B, N) [rad/s].
+        (B, N) joint velocities [rad/s].
     """
     if control == "joint":
         return action * max_command(control, chain, config)
@@ -152,17 +152,17 @@ def resolve_rate(
     q_rest: JointAngles,
     config: ControlConfig,
 ) -> JointVelocities:
-    """Return the joint velocities that give the tool point a velocity, scaled to their limits.
+    """Return joint velocities for a velocity of the tool point, scaled to the joints' limits.
 
     Args:
-        chain: geometry of the robot.
+        chain: kinematics of the robot.
         q: (..., N) joint angles [rad].
-        tool_velocity_world: (..., 3) [m/s].
+        tool_velocity_world: (..., 3) velocity of the tool point [m/s].
         q_rest: (N,) rest posture [rad].
         config: damping and gain.
 
     Returns:
-        (..., N) [rad/s].
+        (..., N) joint velocities [rad/s].
     """
     pull = np.asarray(config.posture_gain_hz * (q_rest - q), float)
     pull[..., 0] = 0.0  # the first joint points the arm at its goal: leave it free
@@ -175,18 +175,18 @@ def resolve_rate(
 def resolve_twist(
     chain: SerialChain, q: JointAngles, twist_world: Floats, config: ControlConfig
 ) -> JointVelocities:
-    """Return the joint velocities that give the tool a twist, scaled to their limits.
+    """Return joint velocities for a twist of the tool, scaled to the joints' limits.
 
-    The solution is damped near singular postures only, where the tool lags behind.
+    The solution is damped only near singularities, where the tool lags behind the command.
 
     Args:
-        chain: geometry of the robot.
+        chain: kinematics of the robot.
         q: (..., N) joint angles [rad].
-        twist_world: (..., 6) velocity [m/s] and turn rate [rad/s].
+        twist_world: (..., 6) linear velocity [m/s] and angular velocity [rad/s].
         config: damping.
 
     Returns:
-        (..., N) [rad/s].
+        (..., N) joint velocities [rad/s].
     """
     J = flatten_axes(np.concatenate([jacobian(chain, q), angular_jacobian(chain, q)], axis=-2), 2)
     manipulability, qd = np.empty(len(J)), np.zeros((len(J), chain.n_joints))
@@ -199,16 +199,16 @@ def resolve_twist(
 
 @kernel(makes_arrays=True)
 def _solve_damped(J: Floats, wanted: Floats, squared_damping: Floats, qd: JointVelocities) -> None:
-    """Change joint velocities so that J qd is as wanted, by damped least squares.
+    """Correct joint velocities by damped least squares, so that J qd approaches the wanted one.
 
-    Sums have a fixed order, unlike those of a linear algebra library, as stiff contacts enlarge the
-    last bit.
+    Sums are computed in a fixed order, unlike those of a linear algebra library, because stiff
+    contacts amplify differences in the last bit.
 
     Args:
         J: (B, M, N) Jacobians.
-        wanted: (B, M) velocities of the tool.
-        squared_damping: (B,) [m^2].
-        qd: (B, N) is changed [rad/s].
+        wanted: (B, M) wanted velocities of the tool.
+        squared_damping: (B,) squared damping [m^2].
+        qd: (B, N) joint velocities [rad/s], which are corrected in place.
     """
     n_rows, n_joints = J.shape[1:]
     gram, missing = np.empty((n_rows, n_rows)), np.empty(n_rows)
@@ -233,7 +233,7 @@ def _solve_damped(J: Floats, wanted: Floats, squared_damping: Floats, qd: JointV
 
 @kernel(makes_arrays=True)
 def _measure_manipulability(J: Floats, out: Floats) -> None:
-    """Write the manipulability (B,), sqrt(det(J J^T)), of Jacobians (B, M, N)."""
+    """Compute the manipulability sqrt(det(J J^T)) of Jacobians (B, M, N) into `out` (B,)."""
     gram = np.empty((J.shape[1], J.shape[1]))
     for b in range(len(J)):
         _write_gram(J[b], 0.0, gram)
@@ -246,7 +246,7 @@ def _measure_manipulability(J: Floats, out: Floats) -> None:
 
 @kernel
 def _write_gram(J: Floats, squared_damping: float, gram: Floats) -> None:
-    """Write the matrix J J^T + squared_damping I (M, M) of a Jacobian (M, N)."""
+    """Compute J J^T + squared_damping I of a Jacobian (M, N) into `gram` (M, M)."""
     for i in range(len(gram)):
         for j in range(i + 1):
             total = squared_damping if i == j else 0.0
@@ -257,10 +257,10 @@ def _write_gram(J: Floats, squared_damping: float, gram: Floats) -> None:
 
 @kernel
 def _factorise(gram: Floats) -> None:
-    """Replace a matrix (M, M) by its factors in L D L^T.
+    """Replace a symmetric matrix (M, M) by the factors of its L D L^T decomposition.
 
-    D is on the diagonal, L below it, with ones on its own diagonal. A column with a pivot that is
-    not positive is 0 below it.
+    D is stored on the diagonal and the unit lower triangular L below it. If a pivot is not
+    positive, the entries of its column below the diagonal are 0.
     """
     for j in range(len(gram)):
         pivot = gram[j, j]
@@ -275,6 +275,6 @@ def _factorise(gram: Floats) -> None:
 
 
 def _scale_to_limits(qd: JointVelocities, chain: SerialChain) -> JointVelocities:
-    """Return joint velocities (..., N) scaled by one factor so that all are within their limits."""
+    """Return joint velocities (..., N), scaled by a common factor to be within their limits."""
     excess = np.max(np.abs(qd) / chain.velocity_limit_rad_s, axis=-1, keepdims=True)
     return qd / np.maximum(excess, 1.0)

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: a `Simulation` of one.
+"""The Gymnasium environment `HRCEnv`, a `Simulation` with a batch of one.
 
 import gymnasium, hrc_env
 env = gymnasium.make("HRCReach-v0", perception="keypoints")
@@ -46,11 +46,11 @@ from hrc_env.tasks.task import TaskType, require_goal
 RENDER_MODES = ("rgb_array", "depth_array")
 """Render modes of an environment."""
 ENDLESS = 2**62
-"""Number of remaining steps without a limit; time limits are gymnasium's `TimeLimit`."""
+"""Number of remaining steps if there is no limit; Gymnasium's `TimeLimit` enforces time limits."""
 
 
 class EnvBase(HasSpec, Stateful):
-    """Base of single and vector environments: states, the form of pictures, `spec`."""
+    """Base class of single and vector environments, with states, rendering settings and `spec`."""
 
     closed = False
     """Whether the environment has been closed."""
@@ -58,7 +58,7 @@ class EnvBase(HasSpec, Stateful):
     """Valid render modes."""
 
     def _open(self, settings: Settings) -> None:
-        """Store the settings, and check the form of pictures."""
+        """Store the settings, and check those of rendering."""
         asked = settings.asked
         check_render_mode(asked.render_mode, self.PICTURES)
         share()
@@ -79,14 +79,14 @@ class EnvBase(HasSpec, Stateful):
     def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
         """Function of (achieved_goal, desired_goal, info) that returns the reward.
 
-        It takes one pair of goals (n,) and the info of its step, or many (B, n) with a list of
-        infos or the infos of a vector environment. With the info of a step it returns the step's
-        reward, bit for bit: the goal's term and those that every task shares. With infos that do
-        not have these, as those of hindsight replay, it returns the goal's term alone.
+        It takes one pair of goals (n,) and the info of its step, or many pairs (B, n) with a list
+        of infos or the infos of a vector environment. With the info of a step it returns exactly
+        the reward of that step: the goal's term and the terms that all tasks share. With infos that
+        lack these terms, such as those of hindsight replay, it returns the goal's term alone.
 
         Raises:
-            NoGoalError: the task has no goals apart from its observation. It is an
-                `AttributeError`, too, so that `hasattr` returns False.
+            NoGoalError: the task has no goals apart from its observation. The error is also an
+                `AttributeError`; therefore `hasattr` returns False.
         """
         separate_goal, terms = require_goal(self._task), rewards.SHARED_TERMS
         return partial(
@@ -101,12 +101,12 @@ class EnvBase(HasSpec, Stateful):
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
         """Function of (achieved_goal, desired_goal, info) that returns whether the episode ended.
 
-        It takes the arguments of `compute_reward`. No goal ends an episode, but a contact does if
-        `config.cost.contact_terminates` is true.
+        It takes the arguments of `compute_reward`. Reaching a goal does not end an episode; a
+        contact ends it if `config.cost.contact_terminates` is true.
 
         Raises:
             NoGoalError: the task has no goals apart from its observation.
-            NoAttributeError: the task ends episodes itself, by `Task.is_terminal`.
+            NoAttributeError: the task terminates episodes by `Task.is_terminal`.
         """
         separate_goal = require_goal(self._task)
         if self._task.can_end:
@@ -119,7 +119,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns False, for many (B,).
+        """Function of (achieved_goal, desired_goal, info) that returns False for each transition.
 
         Only the time limit truncates an episode.
 
@@ -129,7 +129,7 @@ class EnvBase(HasSpec, Stateful):
         return partial(goal.compute_terminated, require_goal(self._task))
 
     def _reward_factor(self, term: str) -> float:
-        """Return the factor on a term of the reward (`set_reward`)."""
+        """Return the factor on a term of the reward, which `set_reward` sets."""
         raise NotImplementedError
 
     def refuse_closed(self) -> None:
@@ -141,14 +141,14 @@ class EnvBase(HasSpec, Stateful):
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, gymnasium.Env[Observation, NDArray[np.float32]]
 ):
-    """A Gymnasium environment: a robot works beside people that it knows through cameras only.
+    """A Gymnasium environment in which a robot observes the people beside it only by cameras.
 
     Args:
-        task: the robot's task, an id or a subclass of `Task`.
-        arguments: the other fields of `EnvConfig`, where all of them are documented.
+        task: the robot's task, an ID or a subclass of `Task`.
+        arguments: the other fields of `EnvConfig`, which documents all arguments.
 
     Raises:
-        ConfigError: a name, index or value is not valid; the error names the valid ones.
+        ConfigError: a name, index or value is invalid; the error names the valid ones.
     """
 
     CHANGES = (
@@ -185,7 +185,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Start an episode.
 
         Args:
-            seed: seed of its random stream; with None the stream continues.
+            seed: seed of the environment's random stream; None continues the stream.
             options: fixed parts of the episode, which replace those of `set_options`: fields of
                 `ResetOptions` by name, such as {"goal": (0.4, 0.3, 1.1), "n_workers": 0}.
 
@@ -193,7 +193,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             The observation and the info.
 
         Raises:
-            ConfigError: an option is invalid; the previous episode then continues.
+            ConfigError: an option is invalid; the previous episode continues.
         """
         self.refuse_closed()
         given = self._with_lasting(options)
@@ -227,36 +227,36 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             one(result.observation, 0),
             float(result.reward[0]),
             bool(result.terminated[0]),
-            self._steps_left <= 0,  # the time limit itself is gymnasium's TimeLimit
+            self._steps_left <= 0,  # the time limit is enforced by gymnasium's TimeLimit
             result.info_of(0),
         )
 
     def words(self, info: Mapping[str, Any]) -> Words:
-        """Return the indices of an info in words: activities, bodies, contacts and cameras.
+        """Return the indices in an info as names of activities, bodies, contacts and cameras.
 
         Args:
-            info: an info of `reset` or `step`.
+            info: info that `reset` or `step` returned.
         """
         return name_indices(info, words_of(self.body_names))
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """Names of the bodies by their index `worker_N/body` in infos."""
+        """Names of the workers' bodies; `worker_N/body` in infos is an index into them."""
         return self.simulation.bodies.names
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """Calibration of this episode's cameras, as the estimator has it."""
+        """Calibration of this episode's cameras, as known to the estimator."""
         return self.simulation.rig_of(0)
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """Faults of this episode's cameras, each with its drawn amount; no robot knows them."""
+        """Faults of this episode's cameras with their drawn amounts; no belief contains them."""
         return self.simulation.cameras.faults_of(0)
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of all episodes to come by name (`set_options`)."""
+        """Options of all future episodes by name, as set by `set_options`."""
         return dict(self._options)
 
     @options.setter
@@ -265,7 +265,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def next_options(self) -> dict[str, Any]:
-        """Options of the next reset alone, set by vector environments of processes."""
+        """Options of the next reset only, set by vector environments that use subprocesses."""
         return dict(self._next_options)
 
     @next_options.setter
@@ -273,16 +273,16 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self._next_options = named_options(options)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix parts of all episodes to come, until the next call: a curriculum.
+        """Fix parts of all future episodes until the next call, for example for a curriculum.
 
-        They are part of `get_state`, so that a restored state continues with the same episodes.
+        The options are part of `get_state`; a restored state continues with the same episodes.
 
         Args:
-            options: options of `reset`, which replace the previous ones; those that `reset` is
-                given have precedence. None fixes nothing.
+            options: options of `reset`, which replace the previous ones; options passed to `reset`
+                take precedence. None fixes nothing.
 
         Raises:
-            ConfigError: an option is invalid, or for a single reset only.
+            ConfigError: an option is invalid, or is for a single reset only.
         """
         given = lasting_options(options)
         self.simulation.fix(given)
@@ -291,16 +291,16 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def check_options(
         self, options: Mapping[str, Any] | ResetOptions | None = None, lasting: bool = False
     ) -> None:
-        """Raise the error that `reset` with these options would raise, without a reset.
+        """Check options of `reset` without resetting.
 
         Args:
             options: options of `reset`.
-            lasting: whether they are meant for `set_options`.
+            lasting: whether the options are for `set_options` rather than for `reset`.
 
         Raises:
             ConfigError: an option is invalid.
         """
-        with warnings.catch_warnings():  # the reset itself warns
+        with warnings.catch_warnings():  # the reset itself issues the warnings
             warnings.simplefilter("ignore")
             if lasting:
                 self.simulation.fix(lasting_options({**self._next_options, **_named(options)}))
@@ -312,7 +312,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def attempt(self, method: str, *args: Any, **kwargs: Any) -> Any:
         """Call a method, and return its `ConfigError` instead of raising it.
 
-        A vector environment closes a process that raises; a returned error reaches the user.
+        A vector environment closes a subprocess that raises an error; a returned error reaches the
+        user.
 
         Args:
             method: name of the method.
@@ -334,16 +335,16 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
         Args:
             weights: weights of the terms that all tasks share; None keeps them.
-            factors: factors on any terms by name, the task's own included: {"goal": 2.0}. Other
-                terms have the factor 1. None keeps the factors.
+            factors: factors on any terms by name, also on those of the task: {"goal": 2.0}. All
+                other terms have the factor 1. None keeps the factors.
 
         Raises:
-            ConfigError: a term is unknown, or a factor is no finite number.
+            ConfigError: a term is unknown, or a factor is not a finite number.
         """
         self.simulation.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> NDArray[Any] | None:  # type: ignore[override]
-        """Return a picture of the scene, (H, W, 3) of uint8 or (H, W) depths [m].
+        """Return a picture of the scene: (H, W, 3) RGB of uint8, or (H, W) depths [m].
 
         Args:
             camera: index or name of a camera of the rig, a viewpoint such as "room" or "top", or a
@@ -359,7 +360,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.views.picture(is_depth, size=self._size, camera=camera, **self._shown)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """Return the cameras' images with crops, keypoints and estimated skeletons, tiled."""
+        """Return a mosaic of the cameras' images with crops, keypoints and estimated skeletons."""
         self.refuse_closed()
         return self.views.mosaic()
 
@@ -367,7 +368,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Return the terms of an observation by name, in metres, seconds and radians.
 
         Args:
-            observation: an observation of `reset` or `step`; goals are terms, too.
+            observation: observation that `reset` or `step` returned; goals are also terms.
         """
         return observations.split(observation, self.simulation.layout)
 
@@ -375,7 +376,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.simulation.reward_factors.get(term, 1.0)
 
     def _with_lasting(self, options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-        """Return the options of a reset by name, with those that were set before."""
+        """Return the options of a reset by name, merged with those that were set before."""
         return {**self._options, **self._next_options, **_named(options)}
 
     def close(self) -> None:
@@ -386,7 +387,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-    """Return the options of a reset by name, or raise `ConfigError` for those of a vector."""
+    """Return the options of a reset by name; raise `ConfigError` for one of vector environments."""
     for name in options if isinstance(options, Mapping) else ():
         if name == "elapsed_steps":
             raise ConfigError(
@@ -441,7 +442,7 @@ def make_spaces(simulation: Simulation) -> Spaces:
     layout, separate_goal, images = simulation.layout, simulation.task.goal, simulation.images
     flat = Box(layout.low, layout.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
-    vars(actions)["control"] = simulation.control  # it is part of files of Stable-Baselines3
+    vars(actions)["control"] = simulation.control  # saved in files of Stable-Baselines3
     if separate_goal is None and images is None:
         return Spaces(flat, actions)
     parts: dict[str, Any] = {observations.FLAT: flat}

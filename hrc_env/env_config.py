@@ -1,7 +1,7 @@
-"""The arguments of an environment, declared once.
+"""The arguments of an environment, all declared in `EnvConfig`.
 
-`gymnasium.make`, `gymnasium.make_vec`, `HRCEnv` and `HRCVectorEnv` take the fields of `EnvConfig`
-as keyword arguments; the command line and the reference derive from them.
+`gymnasium.make`, `gymnasium.make_vec`, `HRCEnv` and `HRCVectorEnv` take its fields as keyword
+arguments; the options of the command line and the reference are derived from them.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +15,7 @@ from hrc_env.core.mapping import answer_unknown_fields, for_json, read_toml, to_
 from hrc_env.core.results import write_whole
 from hrc_env.tasks import DEFAULT
 
-if TYPE_CHECKING:  # at run time they would import the simulator, which `--help` does without
+if TYPE_CHECKING:  # importing them would load the simulator, which `--help` does not need
     from hrc_env.config import HRCConfig
     from hrc_env.motion.clip import Clip
     from hrc_env.motion.config import PeopleConfig
@@ -31,53 +31,53 @@ if TYPE_CHECKING:  # at run time they would import the simulator, which `--help`
 PICTURE_SIZE = (960, 720)
 """Default width and height of a picture [px]."""
 MANY = {"many": True}
-"""Metadata of a field for which the command line takes several words."""
+"""Metadata of a field that takes several values on the command line."""
 NO_WORD = {"words": False}
-"""Metadata of a field that the command line does not have, as films have a form of their own."""
+"""Metadata of a field without a counterpart on the command line."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnvConfig:
-    """The arguments of an environment: keyword arguments of `gymnasium.make` and `make_vec`.
+    """The arguments of an environment, as keyword arguments of `gymnasium.make` and `make_vec`.
 
     Names and values are checked when an environment is made. `arguments` returns the fields that
     differ from the defaults, as in `gymnasium.make(id, **config.arguments())`.
     """
 
     task: "str | TaskType" = DEFAULT
-    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task`
+    """Task of the robot: an ID ("HRCReach-v0") or a subclass of `Task`
     (docs/bring_your_own/task.md)."""
     perception: str = "pixels"
-    """Perception of people: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
-    emulator of that), "truth" (the workers' true poses) or "none". The default of `HRCVectorEnv`
-    and `HRCVecEnv`, which cannot draw images in a batch, is "keypoints"."""
+    """Perception of people: "pixels" (rendered images, processed by MediaPipe Pose), "keypoints"
+    (an emulator of these two), "truth" (the workers' true poses) or "none". The default of
+    `HRCVectorEnv` and `HRCVecEnv`, which cannot render images in batches, is "keypoints"."""
     estimator: "EstimatorChoice" = "particle"
     """Estimator of poses from keypoints: "particle", "kalman" (the same with one hypothesis),
     "paper" (Algorithm 1 as printed), "paper_restarts" (Algorithm 1 with restarts), "triangulation"
-    or "ransac"; the name of a registered one, an `EstimatorSpec`, or a function that makes an
+    or "ransac"; the name of a registered estimator, an `EstimatorSpec`, or a function that makes an
     estimator (docs/bring_your_own/estimator.md)."""
     cameras: "str | Path | Sequence[Any] | RigDistribution | Mapping[str, Any] | None" = field(
         default=None, metadata=MANY
     )
-    """Cameras: indices or names of the scene's cameras; a rig by its name ("lab_gopro"), the path
-    of a TOML file, or a list of places (x, y, z) [m], `CameraConfig`s or mappings; or a
-    `RigDistribution` (or mapping), from which every episode's rig is drawn. None for all cameras of
-    the scene."""
+    """Cameras: indices or names of cameras of the scene; a rig, given by its name ("lab_gopro"), by
+    the path of a TOML file, or as a list of positions (x, y, z) [m], `CameraConfig`s or mappings;
+    or a `RigDistribution` (or mapping), from which the rig of every episode is drawn. None for all
+    cameras of the scene."""
     scene: str | None = None
     """Name of the scene: "lab", a workshop, or "site", a construction site; None for the task's
     default."""
     robot: "str | Robot | Mapping[str, Any] | None" = None
-    """Robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base"), that of a
-    registered one, a `Robot` or a mapping of its fields; None for the task's default."""
+    """Robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base" or that of a
+    registered robot), a `Robot` or a mapping of its fields; None for the task's default."""
     n_workers: int | tuple[int, int] | None = field(default=None, metadata=MANY)
-    """Number of workers, 0 or more, or (fewest, most) between which each episode's number is drawn;
-    the observation has room for the most. None for the task's default."""
+    """Number of workers, at least 0, or its bounds (fewest, most), between which it is drawn for
+    every episode; the observation has slots for the most. None for the task's default."""
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
     """Behaviour of workers towards the robot: "attentive", "hurried", "unaware", "headlong", a
     `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
     motions: "Sequence[str | Path | Clip] | None" = field(default=None, metadata=MANY)
-    """Clips of recorded motion that workers also play, or paths of such clips
+    """Clips of recorded motion, or their paths, which workers play in addition to synthetic motion
     (docs/motion_capture.md); None for the value in `config` (no clips)."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = field(default=None, metadata=MANY)
     """Faults of cameras: `FaultConfig`s or mappings, such as
@@ -86,29 +86,29 @@ class EnvConfig:
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """Appearance of scene and workers, drawn for every episode: "as_built", "varied", "lights",
     "surfaces", "people", an `AppearanceConfig` or a mapping; None for the value in `config` (as
-    built). It affects perception="pixels" and `observe_images`; of it, perception="keypoints" has
-    the strength of the light only."""
+    built). It affects perception="pixels" and `observe_images`; with perception="keypoints", only
+    the brightness of the light has an effect."""
     control: str = "joint"
     """Meaning of an action: "joint" (joint velocities), "tool" (velocity of the tool) or "twist"
-    (velocity and turn rate of the tool). A robot with a hand has one more entry, from -1 open to 1
-    closed."""
+    (linear and angular velocity of the tool). For a robot with a hand, a further entry commands the
+    hand, from -1 (open) to 1 (closed)."""
     shield: "ShieldChoice" = None
     """Shield that may change a command before the robot executes it: "qp", "ssm", "pfl", a
     `ShieldConfig` or a mapping such as {"kind": "qp", "margin_m": 0.1} (docs/reference/shields.md),
-    the name of a registered one or a function; None for no shield."""
+    the name of a registered shield, or a function; None for no shield."""
     observe_images: "ImageConfig | Mapping[str, Any] | tuple[int, int] | None" = field(
         default=None, metadata=MANY
     )
-    """Camera images in the observation, beside the belief: (height, width) [px] of all cameras, a
-    mapping such as {"height": 84, "width": 84, "cameras": ["camera_1"]} or an `ImageConfig`. The
-    observation is then a dictionary of "observation" and "image_<camera>", (H, W, 3) of uint8.
-    None for no images."""
+    """Camera images in the observation, in addition to the belief: (height, width) [px] for images
+    of all cameras, a mapping such as {"height": 84, "width": 84, "cameras": ["camera_1"]} or an
+    `ImageConfig`. The observation becomes a dictionary with the keys "observation" and
+    "image_<camera>", (H, W, 3) of uint8. None for no images."""
     config: "HRCConfig | Mapping[str, Any] | str | Path | None" = field(default=None, metadata=MANY)
     """All other settings (docs/reference/config.md): an `HRCConfig`, a nested mapping of changes to
     the defaults, or the path of a TOML file with such changes."""
     render_mode: str | None = field(default=None, metadata=NO_WORD)
     """Kind of pictures that `render` returns: "rgb_array", "depth_array" or None; `gymnasium.make`
-    also takes "human", a window (docs/pictures.md)."""
+    also takes "human", which opens a window (docs/pictures.md)."""
     width: int = field(default=PICTURE_SIZE[0], metadata=NO_WORD)
     """Width of a picture that `render` returns [px]."""
     height: int = field(default=PICTURE_SIZE[1], metadata=NO_WORD)
@@ -116,8 +116,8 @@ class EnvConfig:
     render_markers: bool = field(default=True, metadata=NO_WORD)
     """Whether `render` shows the markers of the task, such as goals."""
     overlay: str | None = field(default=None, metadata=NO_WORD)
-    """Overlay of `render`: "capsules", the shapes of robot and people from which distances are
-    computed (docs/pictures.md); None for no overlay."""
+    """Overlay that `render` draws: "capsules", the capsules of robot and people from which
+    distances are computed (docs/pictures.md); None for no overlay."""
 
     def arguments(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults, by name."""
@@ -135,21 +135,21 @@ class EnvConfig:
         """Write the fields that differ from the defaults to a TOML file.
 
         Raises:
-            ConfigError: a file cannot hold a value, such as a function or a clip in memory.
+            ConfigError: a value cannot be stored in a file, such as a function or a clip in memory.
         """
         content = {name: for_json(value, name) for name, value in self.arguments().items()}
         write_whole(Path(path), to_toml(content))
 
     @classmethod
     def load(cls, path: str | Path) -> "EnvConfig":
-        """Return the arguments in a TOML file.
+        """Return the arguments that a TOML file contains.
 
         Args:
             path: path of the file; nested parts are tables: `[shield]`, `[[faults]]`,
                 `[config.reward]`.
 
         Raises:
-            ConfigError: the file cannot be read, or has a name that is no field.
+            ConfigError: the file cannot be read, or contains an unknown name.
         """
         content = read_toml(path)
         if "task" in content and not isinstance(content["task"], str):
@@ -164,7 +164,7 @@ def signature_of_env(*first: Parameter) -> Signature:
     """Return the signature of a function that takes an environment's arguments.
 
     Args:
-        first: parameters that come before them.
+        first: parameters of the function that precede these arguments.
     """
     arguments = [
         Parameter(each.name, Parameter.KEYWORD_ONLY, default=each.default, annotation=each.type)
@@ -175,12 +175,12 @@ def signature_of_env(*first: Parameter) -> Signature:
 
 
 def check_keywords(kind: type, given: Iterable[str], *inner: type) -> None:
-    """Raise `ConfigError` for an unknown keyword, with the most similar one that is known.
+    """Raise `ConfigError` for an unknown keyword; the error suggests the most similar valid one.
 
     Args:
-        kind: a class that passes on an environment's arguments; its own parameters are known, too.
-        given: names of the keywords that it passes on.
-        inner: further classes to which it passes them.
+        kind: class that passes on arguments of an environment; its own parameters are also valid.
+        given: names of the keywords that the class passes on.
+        inner: further classes to which the class passes them.
     """
     parameters = [name for each in (kind, *inner) for name in signature(each.__init__).parameters]
     names = [name for name in parameters if name not in ("self", "kwargs", "arguments")]

@@ -16,15 +16,15 @@ FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
 
 
 def read_cameras(words: Sequence[str]) -> Any:
-    """Return the value of `cameras=`.
+    """Parse the words of `--cameras` into a value of the argument `cameras`.
 
-    It is a rig's name or file, the mapping of a distribution of rigs, or a list of cameras: names,
-    numbers and mappings.
+    It is the name or file of a rig, the mapping of a distribution of rigs, or a list of names,
+    indices and mappings of cameras.
     """
     if len(words) == 1:
         from hrc_env.scene.rig_distribution import (
             RigDistribution,
-        )  # here, as it imports the simulator
+        )  # here, because it imports the simulator
         from hrc_env.scene.rigs import RIGS
 
         if words[0].endswith(".toml") or words[0] in RIGS:
@@ -37,7 +37,7 @@ def read_cameras(words: Sequence[str]) -> Any:
 
 
 def read_config(words: Sequence[str]) -> dict[str, Any]:
-    """Return a nested mapping of changes from FIELD=VALUE and TOML files; later ones win."""
+    """Parse FIELD=VALUE words and TOML files into a nested mapping; later ones take precedence."""
     config: dict[str, Any] = {}
     for word in words:
         if "=" not in word and not word.endswith(".toml"):
@@ -49,7 +49,7 @@ def read_config(words: Sequence[str]) -> dict[str, Any]:
 
 
 def _read_assignment(word: str) -> dict[str, Any]:
-    """Return the nested mapping for a.b=VALUE."""
+    """Parse a.b=VALUE into a nested mapping."""
     path, _, text = word.partition("=")
     value = _read_value(text)
     for name in reversed(path.split(".")):
@@ -58,7 +58,7 @@ def _read_assignment(word: str) -> dict[str, Any]:
 
 
 def _read_fault(text: str) -> dict[str, Any]:
-    """Return the mapping of a fault, or raise `ConfigError` if the text is none."""
+    """Parse the mapping of a fault, or raise `ConfigError` if the text is not a JSON object."""
     fault = _read_value(text)
     if not isinstance(fault, dict):
         raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
@@ -66,7 +66,7 @@ def _read_fault(text: str) -> dict[str, Any]:
 
 
 def _read_value(text: str) -> Any:
-    """Return the value of a text in JSON, or else the text."""
+    """Parse a text as JSON, or return the text itself if it is not JSON."""
     try:
         return json.loads(text)
     except json.JSONDecodeError:
@@ -74,12 +74,12 @@ def _read_value(text: str) -> Any:
 
 
 def read_word(word: str | None) -> Any:
-    """Return the value of a JSON object, or else the word."""
+    """Parse a word as a JSON object if it begins with a brace; otherwise return the word itself."""
     return _read_value(word) if word and word.startswith("{") else word
 
 
 def _read_counts(words: Sequence[str]) -> Any:
-    """Return one value, or several, such as the fewest and the most workers."""
+    """Parse one word into a value, or several words into a list, such as the bounds on workers."""
     values = [_read_value(word) for word in words]
     return values[0] if len(values) == 1 else values
 
@@ -91,9 +91,9 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "observe_images": _read_counts,
     "faults": lambda words: [_read_fault(text) for text in words],
 }
-"""Functions that make an argument from words, if it is no value or list of values."""
+"""Functions that parse the words of those arguments that need special treatment, by name."""
 AGENTS_OWN = ("control",)
-"""Arguments whose default is the agent's."""
+"""Arguments whose default is determined by the agent."""
 ON_THE_COMMAND_LINE = {
     "faults": "Each is a JSON object.",
     "cameras": "A RigDistribution is a JSON object.",
@@ -104,11 +104,11 @@ ON_THE_COMMAND_LINE = {
     "config": "Here: FIELD=VALUE as in reward.proximity=0 (a value is JSON, or else text), or "
     ".toml files; later ones win.",
 }
-"""Further sentences about arguments in the help of commands."""
+"""Sentences that the help of commands adds to the descriptions of arguments, by name."""
 
 
 def _read(each: Field[Any], words: Any) -> Any:
-    """Return the value of an argument from its words."""
+    """Parse the words of an argument into its value."""
     if each.name in READERS:
         return READERS[each.name](words)
     return [read_word(str(word)) for word in words] if _is_many(each) else read_word(words)
@@ -120,23 +120,23 @@ def _is_many(each: Field[Any]) -> bool:
 
 
 def _arguments() -> list[Field[Any]]:
-    """Return the fields of `EnvConfig` that commands take."""
+    """Return the fields of `EnvConfig` that are options of commands."""
     return [each for each in fields(EnvConfig) if each.metadata.get("words", True)]
 
 
 class Option(NamedTuple):
-    """A field of a command, as `make_dataclass` takes it."""
+    """Field of a command's dataclass, in the order of elements that `make_dataclass` expects."""
 
     name: str
     """Name of the field."""
     annotation: Any
-    """Type of its words, with their help."""
+    """Type of the option's words, annotated with the help text."""
     default: Any
-    """Default of its words."""
+    """Default of the option's words."""
 
 
 def _options() -> list[Option]:
-    """Return the arguments of an environment as fields of a command."""
+    """Return the arguments of an environment as fields of a command's dataclass."""
     docs, options = field_docs(EnvConfig), list[Option]()
     for each in _arguments():
         kind: Any = tuple[str, ...] if _is_many(each) else str | None
@@ -149,10 +149,10 @@ def _options() -> list[Option]:
 
 
 class _Command:
-    """Base of commands that make an environment."""
+    """Base class of commands that make an environment."""
 
     def keywords(self) -> dict[str, Any]:
-        """Return keyword arguments of `HRCEnv`: lists, mappings, text and numbers only."""
+        """Return keyword arguments of `HRCEnv` as lists, mappings, texts and numbers."""
         given = {each.name: _read(each, getattr(self, each.name)) for each in _arguments()}
         return {name: value for name, value in given.items() if value not in (None, [], {})}
 

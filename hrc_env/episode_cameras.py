@@ -1,7 +1,7 @@
-"""The cameras of every environment's episode, and the draws of their rigs, faults and looks.
+"""The cameras of each environment's episode, and random draws of rigs, faults and appearances.
 
-Most environments share one pipeline; an environment with cameras of its own has another one
-(`pipeline.episodic`).
+Usually all environments share one perception pipeline; an environment with different cameras has a
+separate pipeline (`pipeline.episodic`).
 """
 
 from collections.abc import Mapping
@@ -33,18 +33,18 @@ from hrc_env.settings import Settings
 ALL_DRAWN = Fixed()
 """An episode without fixed parts."""
 NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
-"""Fixed parts of no episode."""
+"""An empty mapping of fixed parts, for episodes that are drawn completely."""
 NEUTRAL = {"darkness": 1.0}
-"""Amounts of faults without effect, if that is not 0."""
+"""Amounts at which a kind of fault has no effect, for kinds for which this is not 0."""
 
 
 class EpisodeCameras:
-    """The cameras of a batch of environments.
+    """The cameras and perception pipelines of a batch of environments.
 
     Args:
         batch: number of environments.
-        settings: settings of all of them.
-        scene: the scene with their common rig.
+        settings: settings that the environments share.
+        scene: scene with the common rig.
     """
 
     def __init__(self, batch: int, settings: Settings, scene: Scene) -> None:
@@ -68,7 +68,7 @@ class EpisodeCameras:
         self._rigs = settings.rigs if has_cameras else None
         if settings.rigs is not None:
             settings.rigs.counts(len(scene.cameras))
-        if self._rigs is not None:  # to raise its errors here
+        if self._rigs is not None:  # to raise errors of the distribution early
             draw_rig(self._rigs, scene, np.random.default_rng(0))
         known = [k for k, each in KINDS.items() if each.group != IMAGE or k in EMULATED]
         self._kinds = tuple(known if level == "keypoints" else KINDS)
@@ -79,9 +79,9 @@ class EpisodeCameras:
         """Assign the cameras of new episodes to environments `ids`.
 
         Args:
-            ids: the environments in question.
-            given: fixed parts of their episodes by environment.
-            sensor_rngs: a generator for each environment of the batch.
+            ids: (n,) indices of the environments.
+            given: fixed parts of the episodes by environment.
+            sensor_rngs: random generators of the sensors, one for each environment of the batch.
         """
         differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
         if not differ and not isinstance(self.pipeline, EpisodicPipeline):
@@ -92,12 +92,12 @@ class EpisodeCameras:
             pipeline.assign(b, setup)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Reset the perception of environments `ids`, and record the draws of their episodes."""
+        """Reset the perception of environments `ids`, and record their drawn values."""
         self.pipeline.reset(ids, sensor_rngs, tracker_rngs)
         self._record(ids)
 
     def info(self, ids: Ints) -> Info:
-        """Return the draws of the episodes of environments `ids` by name; empty without cameras."""
+        """Return the values drawn for the episodes of environments `ids`; empty without cameras."""
         return {name: values[ids] for name, values in self._drawn.items()}
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
@@ -106,19 +106,20 @@ class EpisodeCameras:
         return self.scene.rig if own is None else own.rig
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the cameras of environment b's episode with their matrices."""
+        """Return the pinhole cameras of environment b's episode, with their matrices."""
         rig = self.rig_of(b)
         return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
 
     @property
     def are_drawn(self) -> bool:
-        """Whether every episode has a rig of its own."""
+        """Whether a new rig is drawn for every episode."""
         return self._rigs is not None
 
     def projections(self) -> Floats:
-        """Return (B, C, 3, 4) the projections of every environment's episode.
+        """Return the cameras' projection matrices (B, C, 3, 4) in every environment's episode.
 
-        They are from the world [m] to pixels; NaN for cameras that are not in the episode's rig.
+        They map world coordinates [m] to pixels; those of cameras that are not in the episode's rig
+        are NaN.
         """
         batch = len(self._drawn[N_CAMERAS])
         P = np.full((batch, len(self.names), 3, 4), np.nan)
@@ -128,12 +129,12 @@ class EpisodeCameras:
         return P
 
     def faults_of(self, b: int) -> tuple[FaultConfig, ...]:
-        """Return the faults of environment b's cameras, each with the amount of its episode."""
+        """Return the faults of environment b's cameras, with the amounts drawn for its episode."""
         schedule = self.pipeline.schedule_of(b)
         return () if schedule is None else schedule.faults
 
     def draw_images(self, sensor_rngs: Generators) -> Images:
-        """Return the observed images of the sensors' last moment."""
+        """Render the images in the observation at the time of the sensors' last exposure."""
         if self.images is None:
             return {}
         moment = self.pipeline.sensor.now
@@ -142,20 +143,20 @@ class EpisodeCameras:
         return self.images.draw(moment, [self.look_of(b, sensor_rngs[b]) for b in ids], rigs)
 
     def look_of(self, b: int, sensor_rng: np.random.Generator) -> Look | None:
-        """Return the look of environment `b` in its episode; None for the scene as built."""
+        """Return the appearance drawn for environment b's episode; None for the scene as built."""
         look, appearance = self.pipeline.look_of(b), self._appearance_of(b)
         if look is not None or appearance == AS_BUILT:
             return look
-        if b not in self._looks or self._looks[b][0] is not sensor_rng:  # a new episode
+        if b not in self._looks or self._looks[b][0] is not sensor_rng:  # a new episode has begun
             self._looks[b] = sensor_rng, draw_look(appearance, self.scene.n_workers, sensor_rng)
         return self._looks[b][1]
 
     def get_state(self) -> Any:
-        """Return a copy of the state of the pipelines."""
+        """Return a copy of the pipelines' state."""
         return self.pipeline.get_state()
 
     def set_state(self, state: Any) -> None:
-        """Restore a state, those of environments with cameras of their own included."""
+        """Restore a state, including the separate pipelines of environments."""
         if isinstance(state, EpisodicState):
             self._make_episodic()
         self.pipeline.set_state(state)
@@ -169,7 +170,7 @@ class EpisodeCameras:
             self.images.close()
 
     def _own(self, b: int) -> CameraSetup | None:
-        """Return the cameras of environment b's episode; None for the common ones."""
+        """Return the cameras of environment b's episode; None if it uses the common ones."""
         return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
 
     def _appearance_of(self, b: int) -> AppearanceConfig:
@@ -178,7 +179,7 @@ class EpisodeCameras:
         return self.config.appearance if own is None else own.appearance
 
     def _make_episodic(self) -> EpisodicPipeline:
-        """Return a pipeline in which environments can have cameras of their own."""
+        """Return a pipeline in which every environment can have different cameras."""
         if not isinstance(self.pipeline, EpisodicPipeline):
             level, estimator = self._settings.asked.perception, self._settings.estimator
             made = level, estimator, self.scene, self.config
@@ -189,7 +190,7 @@ class EpisodeCameras:
     def _setup_of_episode(
         self, fixed: Fixed, sensor_rng: np.random.Generator
     ) -> CameraSetup | None:
-        """Return the cameras of an environment's next episode; None for the common ones."""
+        """Return the cameras of an environment's next episode; None if it uses the common ones."""
         rigs = self._rigs if fixed.rig is None else fixed.rigs
         if not fixed.changes_cameras and rigs is None:
             return None
@@ -204,7 +205,7 @@ class EpisodeCameras:
         )
 
     def _record(self, ids: Ints) -> None:
-        """Record the draws of the episodes of environments `ids`."""
+        """Record the values drawn for the episodes of environments `ids`."""
         if not self._drawn:
             return
         for b in ids.tolist():
@@ -221,7 +222,7 @@ class EpisodeCameras:
 def _difference(
     rig: tuple[CameraConfig, ...], usual: tuple[CameraConfig, ...]
 ) -> Mapping[str, float]:
-    """Return the number of cameras of a rig, and their largest shift and turn from another rig."""
+    """Return a rig's number of cameras, and the largest shift and rotation from the usual rig."""
     if rig == usual:
         return {N_CAMERAS: len(rig), MOVED: 0.0, TURNED: 0.0}
     named, moved_m, turned_rad = {camera.name: camera for camera in usual}, 0.0, 0.0
@@ -236,7 +237,7 @@ def _difference(
 
 @lru_cache(maxsize=256)
 def _amounts(faults: tuple[FaultConfig, ...], kinds: tuple[str, ...]) -> Mapping[str, float]:
-    """Return the amount of each kind of fault; of several, the one with the largest effect."""
+    """Return the amount of each kind of fault; of several faults of a kind, the largest effect."""
     most = {kind: NEUTRAL.get(kind, 0.0) for kind in kinds}
     for fault in faults:
         none = NEUTRAL.get(fault.kind, 0.0)

@@ -1,4 +1,4 @@
-"""Infos of a step or a reset by name: cost, incidents, tracking, workers and cameras."""
+"""Infos of a step or a reset by name, about cost, incidents, tracking, workers and cameras."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ from hrc_env.tracking import metrics
 
 
 def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: CostConfig) -> Info:
-    """Return the cost under the names that safe-RL libraries read, its parts, and the separation.
+    """Return the cost with its parts and the separation, by the names that safe-RL libraries read.
 
     Args:
         cost: the cost of the step.
@@ -44,10 +44,10 @@ def reset_info(
     terms: Sequence[RewardTerm],
     config: CostConfig,
 ) -> Info:
-    """Return the infos of a reset about reward, cost and incidents: zeros, and the separation.
+    """Return the infos of a reset about reward, cost and incidents: zeros, except the separation.
 
     Args:
-        robot: state of the robots.
+        robot: states of the robots.
         truth: true poses of the workers.
         present: (B, W) whether each worker is in the scene.
         terms: terms of the reward.
@@ -72,12 +72,12 @@ def reset_info(
 def incident_info(
     happened: Records2[Incident], monitor: IncidentMonitor, robot: RobotState
 ) -> Info:
-    """Return the incidents of a step.
+    """Return infos about the incidents of a step.
 
     Args:
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.
-        monitor: monitor of the episodes' incidents.
-        robot: state of the robots.
+        monitor: monitor of the incidents in the episodes.
+        robot: states of the robots.
     """
     summary = incidents.summarize(happened, monitor.history)
     return {
@@ -89,20 +89,20 @@ def incident_info(
 def tracking_info(
     estimate: PoseEstimate, truth: WorkerTruth, present: Bools, identities: metrics.Identities
 ) -> Info:
-    """Return errors of the tracks, and changes of their identities; NaN without a track.
+    """Return the errors of the tracks and the changes of their identities; NaN without a track.
 
     Args:
-        estimate: the belief about the workers.
-        truth: their true poses.
+        estimate: estimate of the workers' poses.
+        truth: true poses of the workers.
         present: (B, W) whether each worker is in the scene.
-        identities: assignment of tracks to workers so far, which is updated.
+        identities: previous assignment of tracks to workers, which is updated in place.
     """
     errors = metrics.measure_errors(estimate, truth.joints_world, present, identities)
     return {f"tracking/{name}": errors[name] for name in metrics.TRACKING.names or ()}
 
 
 def worker_info(activity: Ints, body: Ints, happened: Records2[Incident] | None) -> Info:
-    """Return each worker's activity and body, and the contacts that begin.
+    """Return the activity and body of each worker, and the contacts that begin in this step.
 
     Args:
         activity: (B, W) index of the activity.
@@ -116,12 +116,12 @@ def worker_info(activity: Ints, body: Ints, happened: Records2[Incident] | None)
 
 
 def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy | None) -> Info:
-    """Return the cameras that contradict the others, and whether there are more people than slots.
+    """Return whether cameras contradict the others, and whether there are more people than slots.
 
     Args:
         cameras: names of the C cameras.
         suspected: (B, C) whether each camera contradicts the others.
-        vacancy: search of the floor; None without cameras, for which there are no infos.
+        vacancy: state of the floor; None without cameras, for which no infos are returned.
     """
     if vacancy is None:
         return {}
@@ -134,7 +134,7 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
 
 
 def words_of(bodies: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Return the words of each kind of index in infos.
+    """Return the names that correspond to the indices in infos, by kind of index.
 
     Args:
         bodies: names of the workers' bodies.

@@ -1,7 +1,8 @@
-"""Observations: one declaration for each term.
+"""The observation of an environment, composed of terms that are declared once.
 
-The space, the environment's page, `split` and the tests derive from the terms, so that they agree.
-Terms read the *estimate* of the worker, never the truth.
+The observation space, the documentation of the environments, `split` and the tests are derived from
+these declarations and are therefore consistent. Terms read the *estimate* of the workers, never the
+truth.
 """
 
 import math
@@ -29,61 +30,61 @@ from hrc_env.core.typing import Floats, Tensor
 from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
-"""Values of `HRCConfig.uncertainty`: other measures of each joint's covariance."""
+"""Valid values of `HRCConfig.uncertainty`, further measures of each joint's covariance."""
 FLAT = "observation"
-"""Key of the flat observation in a dict with goals or images."""
+"""Key of the flat observation in an observation dictionary with goals or images."""
 IMAGE = "image_"
-"""Prefix of the keys of images, before the camera's name."""
+"""Prefix of the keys of images in an observation dictionary, followed by the camera's name."""
 FAR_SEPARATION_M = 1.0
-"""Greatest separation that is reported, also for workers without a track [m]."""
+"""Largest separation in the observation, also used for workers without a track [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """The numbers on which the lengths of terms depend."""
+    """Properties of an environment on which the lengths of observation terms depend."""
 
     arm_joints: int
-    """Number of hinges of the robot."""
+    """Number of revolute joints (hinges) of the robot."""
     actions: int
     """Length of an action."""
     workers: int
     """Number of workers."""
     horizons: int = 0
-    """Number of times ahead for which there is a forecast."""
+    """Number of forecast horizons."""
     uncertainty: tuple[str, ...] = ()
-    """Chosen values of `UNCERTAINTY`."""
+    """Selected values of `UNCERTAINTY`."""
     hands: int = 0
-    """Number of hands: 1 for an arm that can hold something."""
+    """Number of hands, fingered or suction: 1 or 0."""
     fingers: int = 0
     """Number of hands with fingers: 1 or 0."""
     objects: int = 0
     """Number of loose objects of the task."""
     slides: int = 0
-    """Number of slides of the robot."""
+    """Number of prismatic joints (slides) of the robot."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ObservationTerm:
-    """One block of the flat observation: clip(function, -bound, bound) / scale."""
+    """One block of the flat observation, computed as clip(function, -bound, bound) / scale."""
 
     name: str
     """Name of the term in `split_observation` and on the environment's page."""
     size: int | Callable[[Sizes], int]
-    """Number of entries, or a function of the sizes on which it depends."""
+    """Number of entries, or a function that computes it from `Sizes`."""
     unit: str
     """Unit of the function's result: "m", "rad", ..., or "-"."""
     frame: str
     """Frame of vectors: "world", "base", ..., or "-"."""
     bound: float
-    """Greatest magnitude, in `unit`; larger values are clipped."""
+    """Largest magnitude, in `unit`; larger values are clipped."""
     scale: float
-    """Magnitude of an observed 1, in `unit`."""
+    """Magnitude that corresponds to an observed value of 1, in `unit`."""
     doc: str
     """Sentence for the environment's page."""
     function: Callable[[Belief], Floats]
-    """Function from a belief to (B, ...), which is flattened for each environment; it is not called
-    for a term without entries."""
+    """Function of a belief that returns an array (B, ...), which is flattened for each environment.
+    It is not called for a term without entries."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take one argument."""
@@ -91,14 +92,14 @@ class ObservationTerm:
 
 
 def _nearest_direction(belief: Belief) -> Floats:
-    """Return unit vectors (B, W, 3) from the robot to near bodies, 0 for others."""
+    """Return unit vectors (B, W, 3) from the robot to bodies nearby; 0 for distant ones."""
     to_worker = belief.separation.point_b_world - belief.separation.point_a_world
     near = belief.separation.distance_m < FAR_SEPARATION_M
     return np.where(near[..., None], directions(to_worker, 1e-3), 0.0)
 
 
 def directions(vectors: Floats, softening: float) -> Floats:
-    """Return vectors (..., 3) divided by their length plus a softening, so that 0 stays 0."""
+    """Return vectors (..., 3) divided by the sum of their length and a softening; 0 remains 0."""
     shortened = np.array(vectors)
     _shorten(shortened.reshape(-1, 3), softening)
     return shortened
@@ -106,7 +107,7 @@ def directions(vectors: Floats, softening: float) -> Floats:
 
 @kernel
 def _shorten(vectors: Floats, softening: float) -> None:
-    """Divide vectors (n, 3) by their length plus a softening, in place."""
+    """Divide vectors (n, 3) in place by the sum of their length and a softening."""
     for k in range(len(vectors)):
         x, y, z = vectors[k, 0], vectors[k, 1], vectors[k, 2]
         divisor = math.sqrt(x * x + y * y + z * z) + softening
@@ -115,27 +116,27 @@ def _shorten(vectors: Floats, softening: float) -> None:
 
 
 def _hinges(belief: Belief, values: Floats) -> Floats:
-    """Return the values of hinges among those of all joints (B, N)."""
+    """Select the values of revolute joints from those of all joints (B, N)."""
     return values if belief.robot.slides is None else values[:, ~belief.robot.slides]
 
 
 def _slides(belief: Belief, values: Floats) -> Floats:
-    """Return the values of slides among those of all joints (B, N)."""
+    """Select the values of prismatic joints from those of all joints (B, N)."""
     return values[:, require(belief.robot.slides, "A slide")]
 
 
 def _hand(belief: Belief) -> HandState:
-    """Return the state of the hand, which must be there."""
+    """Return the state of the hand; raise an error if there is none."""
     return require(belief.hand, "A hand")
 
 
 def _objects(belief: Belief) -> ObjectState:
-    """Return the state of the loose objects, which must be there."""
+    """Return the state of the loose objects; raise an error if there are none."""
     return require(belief.objects, "A loose object")
 
 
 def _joints_forecast(belief: Belief) -> Floats:
-    """Return the joints (B, W, H, J, 3) at H times ahead, from the present tool point [m]."""
+    """Return joint forecasts (B, W, H, J, 3) for H horizons, relative to the tool point now [m]."""
     joints = np.stack([later.mean_world for later in belief.forecast], axis=2)
     return joints - belief.robot.tool_world[:, None, None, None]
 
@@ -242,7 +243,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: _objects(belief).held.astype(float),
     ),
 )
-"""First terms of the observation: the state of the robot and of the objects that it handles."""
+"""First terms of the observation, about the robot and the objects that it handles."""
 
 SLIDE_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -266,7 +267,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: _slides(belief, belief.robot.qd),
     ),
 )
-"""Next terms, of a robot with slides."""
+"""Second terms of the observation, about the prismatic joints of a robot that has them."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -412,7 +413,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: covariance_factor_m(belief.estimate),
     ),
 )
-"""Last terms: the last action, and the estimated workers."""
+"""Last terms of the observation, about the last action and the estimated workers."""
 
 SHIELD_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -426,27 +427,28 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: require(belief.shield_change, "What the shield changed"),
     ),
 )
-"""Terms with `HRCConfig.observe_shield`."""
+"""Terms that are added if `HRCConfig.observe_shield` is true."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObservationLayout:
-    """The entries of the flat observation that belong to each term."""
+    """Assignment of the entries of the flat observation to terms."""
 
     terms: tuple[int, ...]
     """Indices of the terms that have entries."""
     slices: dict[str, slice]
-    """Entries of every term by name."""
+    """Range of entries of each term, by its name."""
     low: Tensor
-    """(n,) least value of each entry."""
+    """(n,) lower bound of each entry."""
     high: Tensor
-    """(n,) greatest value of each entry."""
+    """(n,) upper bound of each entry."""
     scale: Floats
-    """(n,) magnitude of an observed 1 for each entry, in the term's unit."""
+    """(n,) magnitude that corresponds to an observed value of 1 for each entry, in the unit of its
+    term."""
 
 
 def make_layout(terms: tuple[ObservationTerm, ...], sizes: Sizes) -> ObservationLayout:
-    """Return the layout of terms for given sizes."""
+    """Compute the layout of the flat observation for given sizes."""
     counts = [term.size if isinstance(term.size, int) else term.size(sizes) for term in terms]
     ends = np.cumsum(counts).tolist()
     slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, counts, ends, strict=True)}
@@ -459,7 +461,7 @@ def make_layout(terms: tuple[ObservationTerm, ...], sizes: Sizes) -> Observation
 def observe(
     belief: Belief, layout: ObservationLayout, terms: tuple[ObservationTerm, ...]
 ) -> Tensor:
-    """Return flat observations.
+    """Compute the flat observations for beliefs.
 
     Args:
         belief: beliefs of B robots.
@@ -467,11 +469,11 @@ def observe(
         terms: all terms.
 
     Returns:
-        (B, n)
+        (B, n) flat observations.
 
     Raises:
-        ConfigError: a term has another number of entries than its `size`.
-        FloatingPointError: a term is NaN, which is an error in code and never due to a camera.
+        ConfigError: the number of entries of a term differs from its `size`.
+        FloatingPointError: a term is NaN, which is due to an error in code and never to a camera.
     """
     batch = len(belief.action)
     present = [terms[k] for k in layout.terms]
@@ -493,7 +495,7 @@ def observe(
 
 
 def _value(term: ObservationTerm, belief: Belief) -> Floats:
-    """Return the value (B, ...) of a term; functions of users get a read-only belief."""
+    """Compute the value (B, ...) of a term; functions of users receive a read-only belief."""
     if is_of_user(term.function):
         return call_user_function(
             f"Observation term {term.name!r}", term.function, lend_belief(belief)
@@ -503,14 +505,14 @@ def _value(term: ObservationTerm, belief: Belief) -> Floats:
 
 @kernel
 def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observation: Tensor) -> bool:
-    """Write scaled and clipped entries (B, n), and return whether none is NaN.
+    """Scale and clip the entries of observations, and return whether none is NaN.
 
     Args:
         physical: (B, n) entries in the terms' units.
-        scale: (n,) magnitude of an observed 1.
-        low: (n,) least value.
-        high: (n,) greatest value.
-        observation: (B, n) is filled.
+        scale: (n,) magnitude that corresponds to an observed value of 1.
+        low: (n,) lower bounds.
+        high: (n,) upper bounds.
+        observation: (B, n) output, which is filled.
     """
     numbers = True
     for b in range(physical.shape[0]):
@@ -524,9 +526,9 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
 def split(
     observation: Tensor | Mapping[str, Tensor], layout: ObservationLayout
 ) -> dict[str, Floats]:
-    """Return a flat observation (..., n) as named terms in their units.
+    """Split a flat observation (..., n) into named terms in their units.
 
-    Goals and images of a dict observation are added as they are.
+    Goals and images of an observation dictionary are added without scaling.
     """
     if isinstance(observation, Mapping):
         beside: dict[str, Any] = {

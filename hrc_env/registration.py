@@ -1,9 +1,9 @@
-"""Registration of a user's own tasks, estimators, robots, detectors and shields by name.
+"""Registration of custom tasks, estimators, robots, detectors and shields by name.
 
-The command line knows the registrations of a file, too:
-`python -m hrc_env --import my_file.py play MyTask-v0`, or by the environment variable
-`HRC_ENV_IMPORT`. Registrations reach every process that this one starts, when it imports this
-package. The files in `examples/bring_your_own/` have an example of each.
+The command line imports files with registrations by `python -m hrc_env --import my_file.py play
+MyTask-v0` or by the environment variable `HRC_ENV_IMPORT`. Child processes adopt the registrations
+of this process when they import this package. The files in `examples/bring_your_own/` contain an
+example of each kind.
 """
 
 import os
@@ -31,22 +31,21 @@ if TYPE_CHECKING:
 
 EntryT = TypeVar("EntryT")
 IMPORT = "HRC_ENV_IMPORT"
-"""Environment variable of Python files that are imported with this package, separated as in PATH.
-"""
+"""Environment variable with the paths of Python files to import, separated as in PATH."""
 IDS: list[str] = []
-"""Ids of the registered environments."""
+"""IDs of the registered environments."""
 
 
 def register_task(task: "TaskType") -> None:
-    """Register a task: its id works in `gymnasium.make`, `make_vec` and `play`.
+    """Register a task, so that its ID can be used in `gymnasium.make`, `make_vec` and `play`.
 
     Args:
         task: a subclass of `Task`.
 
     Raises:
-        ConfigError: the id is taken, or a part of the task is missing or wrong.
+        ConfigError: the ID is already in use, or a part of the task is missing or invalid.
     """
-    from hrc_env.rehearsal import play_briefly  # here, as kernels take time to import
+    from hrc_env.rehearsal import play_briefly  # here, because importing kernels takes time
     from hrc_env.settings import resolve_settings
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
@@ -66,7 +65,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
     Its estimates must be finite and have the shapes of `PoseEstimate`.
 
     Raises:
-        ConfigError: the name is taken, or a part of the estimator is missing or wrong.
+        ConfigError: the name is already in use, or a part of the estimator is missing or invalid.
     """
     from hrc_env.tracking.estimators import ESTIMATORS, check_estimator
 
@@ -77,11 +76,11 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 def register_robot(robot: "Robot") -> None:
     """Register a robot under its name for `robot=` and `--robot`.
 
-    A warning names visual geoms, which cameras see, that differ from the capsules, from which
+    A warning lists visual geoms, which cameras see, that do not match the capsules, from which
     distances are computed.
 
     Raises:
-        ConfigError: the name is taken, or a part of the robot is missing or wrong.
+        ConfigError: the name is already in use, or a part of the robot is missing or invalid.
     """
     from hrc_env.scene.robot import ROBOTS, Robot, find_robot
     from hrc_env.scene.robot_looks import warn_of_mismatch
@@ -90,7 +89,7 @@ def register_robot(robot: "Robot") -> None:
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     robot = find_robot(robot)
     warn_of_mismatch(robot)
-    if not str(robot.mjcf).lstrip().startswith("<"):  # other processes may have another folder
+    if not str(robot.mjcf).lstrip().startswith("<"):  # working directories may differ
         robot = replace(robot, mjcf=str(Path(robot.mjcf).resolve()))
     _add(ROBOTS, robot.name, robot)
 
@@ -100,13 +99,13 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
 
     Args:
         name: name of the detector.
-        make: function without arguments that is called once for each thread of detection. It
-            returns a function of a crop (256, 256, 3), RGB of uint8, that returns (15, 3): x, y
-            [px] from the crop's corner and confidence in [0, 1] of each of `JOINTS`, and NaN, NaN,
-            0 for a joint without detection; or None if no person is detected.
+        make: function without arguments that is called once in each detection thread. It returns a
+            function of a crop (256, 256, 3), RGB of uint8. That function returns an array (15, 3)
+            with x, y [px] from the crop's corner and confidence in [0, 1] of each of `JOINTS`, or
+            NaN, NaN, 0 for an undetected joint; it returns None if no person is detected.
 
     Raises:
-        ConfigError: the name is taken, or `make` is no such function.
+        ConfigError: the name is already in use, or `make` is not such a function.
     """
     from hrc_env.core.brought import check_arguments
     from hrc_env.perception.detector import DETECTORS
@@ -121,10 +120,10 @@ def register_shield(name: str, shield: "Shield") -> None:
 
     Args:
         name: name of the shield.
-        shield: the shield, a function as `hrc_env.Shield`.
+        shield: the shield, a function with the signature of `hrc_env.Shield`.
 
     Raises:
-        ConfigError: the name is taken, or the shield is no such function.
+        ConfigError: the name is already in use, or the shield is not such a function.
     """
     from hrc_env.safety.shield import SHIELDS, check_shield
 
@@ -134,7 +133,7 @@ def register_shield(name: str, shield: "Shield") -> None:
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
-    """Register the environment of a task with Gymnasium."""
+    """Register a task as an environment of Gymnasium."""
     if task_id in IDS:  # inherited from another process
         registry.pop(task_id, None)
         IDS.remove(task_id)
@@ -149,14 +148,14 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
 
 
 def import_files(paths: str | Path | Sequence[str | Path] | None = None) -> None:
-    """Import Python files with registrations, each once, here and in child processes.
+    """Import Python files with registrations once, in this process and in child processes.
 
     Args:
-        paths: a path, a list of paths, or a text of several, separated as in PATH; None for those
-            of the environment variable `HRC_ENV_IMPORT`.
+        paths: a path, a list of paths, or a string of several paths, separated as in PATH; None for
+            the paths in the environment variable `HRC_ENV_IMPORT`.
 
     Raises:
-        ConfigError: there is no such file.
+        ConfigError: a file does not exist or cannot be imported.
     """
     given = os.environ.get(IMPORT, "") if paths is None else paths
     each = [given] if isinstance(given, str | Path) else given
@@ -168,10 +167,10 @@ def import_files(paths: str | Path | Sequence[str | Path] | None = None) -> None
 
 
 def adopt() -> None:
-    """Adopt the registrations of the process that started this one.
+    """Adopt the registrations of the parent process.
 
-    Those of this process have precedence. The error of a file is stored for lookups of names that
-    it would have registered.
+    Registrations of this process take precedence. If a file cannot be imported, its error is stored
+    and shown when a name is looked up that it would have registered.
     """
     if not reserve():
         return
@@ -182,7 +181,7 @@ def adopt() -> None:
     for path in parent.files:
         try:
             _import_file(Path(path), recorded=False)
-        except Exception as error:  # the file may not be needed here
+        except Exception as error:  # the file may not be needed in this process
             FILES[path] = f"{type(error).__name__}: {error}"
     for task_id, entry in parent.entries.get("task", {}).items():
         if task_id not in IDS:
@@ -190,11 +189,11 @@ def adopt() -> None:
 
 
 def _import_file(path: Path, recorded: bool) -> None:
-    """Import a file unless it has been; if it is `recorded`, child processes do so, too."""
+    """Import a file unless it has been imported; child processes import it if it is `recorded`."""
     from hrc_env.core.registry import FILES, importing, share
 
     name = f"hrc_env_import_{path.stem}"
-    if name in sys.modules and sys.modules[name].__file__ != str(path):  # another of that name
+    if name in sys.modules and sys.modules[name].__file__ != str(path):  # another file
         name = f"{name}_{zlib.crc32(str(path).encode()):x}"
     if name in sys.modules:
         return
@@ -225,7 +224,7 @@ def _add(table: "Registry[EntryT]", name: str, entry: EntryT, is_function: bool 
         is_function: whether it must be a function.
 
     Raises:
-        ConfigError: the name is taken, or the entry is no function.
+        ConfigError: the name is already in use, or the entry is not a function.
     """
     if is_function and not callable(entry):
         raise ConfigError(f"{name}: a {table.kind} must be a function, got {entry!r}.")
@@ -239,26 +238,26 @@ ADVICE = {
     "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
     "shield": "Register the shield (hrc_env.register_shield) and give its name.",
 }
-"""Advice for arguments that JSON cannot hold, by name."""
+"""Advice in errors about arguments that cannot be stored as JSON, by name."""
 OTHERWISE = (
     "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
     "file (hrc_env.save_clip writes one)."
 )
-"""Advice for other arguments."""
+"""Advice in errors about all other arguments that cannot be stored as JSON."""
 
 
 class Spec(EnvSpec):
-    """A spec with all arguments in its JSON, from which the same environment can be made."""
+    """An environment specification that stores all arguments of the environment in its JSON."""
 
     def to_json(self) -> str:
-        """Return the spec as JSON, or raise `ConfigError` for an argument that JSON cannot hold."""
+        """Return the specification as JSON; raise `ConfigError` if it cannot hold an argument."""
         from hrc_env.config import HRCConfig, resolve
         from hrc_env.core.mapping import for_json
         from hrc_env.tasks.task import find_task
         from hrc_env.tracking.estimators import find_estimator
 
         given = {**self.kwargs}
-        if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
+        if isinstance(given.get("config"), HRCConfig):  # its tracker depends on estimator
             task = find_task(given.get("task", DEFAULT))
             estimator = find_estimator(given.get("estimator", "particle"))
             given["config"] = resolve(given["config"], task, estimator)
@@ -276,7 +275,7 @@ class Spec(EnvSpec):
 
 
 def make_spec(spec: EnvSpec) -> Spec:
-    """Return a spec with plain arguments, in which names stand for registered objects."""
+    """Return a specification with plain arguments, in which names replace registered objects."""
     from hrc_env.core.mapping import convert_to_plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS
@@ -291,7 +290,7 @@ def make_spec(spec: EnvSpec) -> Spec:
 
 
 class HasSpec:
-    """Base of environments that can be made again from their `spec`."""
+    """Base class of environments that can be made again from their `spec`."""
 
     _spec: Spec | None = None
 

@@ -1,4 +1,4 @@
-"""Two steps with a user's own parts, so that their errors are raised before an episode begins."""
+"""Trial runs of custom tasks, estimators and shields, which raise their errors early."""
 
 import warnings
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from hrc_env.tasks.task import is_known
 from hrc_env.tracking.estimators import BUILT_IN, ESTIMATORS
 
 _PLAYED: list[tuple[Any, ...]] = []
-"""Parts that have passed, which are not played again."""
+"""Combinations of custom parts that have passed a trial run, which is not repeated."""
 _KEPT = 32
-"""Largest number of parts that are remembered."""
+"""Largest number of combinations in `_PLAYED`."""
 
 
 def rehearse(settings: Settings) -> None:
-    """Play two steps with a user's own task, estimator or shield, if they have not been played.
+    """Play two steps with a custom task, estimator or shield, unless they have been checked before.
 
     Raises:
-        ConfigError: one of their functions returns a wrong type, shape or value.
+        ConfigError: a function of these parts returns a wrong type, shape or value.
     """
     task = None if is_known(type(settings.task)) else type(settings.task)
     parts = task, _find_own_estimator(settings), _find_own_shield(settings)
@@ -41,9 +41,9 @@ def rehearse(settings: Settings) -> None:
 
 
 def play_briefly(settings: Settings) -> None:
-    """Play two steps of two environments without images, and check every result of hooks.
+    """Play two steps of two environments without images, and check every result of task hooks.
 
-    There are no cameras unless the estimator is a user's own.
+    Cameras are emulated only if the estimator is a custom one.
     """
     has_estimator = _find_own_estimator(settings) is not None
     asked = replace(settings.asked, perception="keypoints" if has_estimator else "none")
@@ -52,7 +52,7 @@ def play_briefly(settings: Settings) -> None:
     sizes = Sizes(2, settings.n_workers[1])
     task = protect_arrays(add_checks(settings.task, sizes))
     plain = replace(settings, asked=asked, config=config, task=task, images=None, rigs=None)
-    with warnings.catch_warnings():  # the environment itself repeats them
+    with warnings.catch_warnings():  # the environment itself issues them again
         warnings.simplefilter("ignore")
         simulation = Simulation(sizes.batch, plain)
     sizes.objects, everyone = len(simulation.scene.objects.names), np.arange(sizes.batch)
@@ -69,14 +69,14 @@ def play_briefly(settings: Settings) -> None:
 
 
 def _find_own_estimator(settings: Settings) -> Any:
-    """Return the function that makes a user's own estimator; None without, or without cameras."""
+    """Return the function that makes a custom estimator; None without one, or without cameras."""
     spec = settings.estimator
     known = spec in BUILT_IN or ESTIMATORS.name_of(spec) is not None
     return None if known or settings.asked.perception not in CAMERA_LEVELS else spec.make
 
 
 def _find_own_shield(settings: Settings) -> Any:
-    """Return a user's own shield; None without."""
+    """Return the user's custom shield, or None if there is none."""
     asked = settings.asked.shield
     known = isinstance(asked, ShieldConfig | Mapping) or (
         isinstance(asked, str) and asked in PRESETS

@@ -39,49 +39,51 @@ from hrc_env.tasks.task import AnyTask
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """Fixed parts of an episode: the names that `reset(options={...})` takes.
+    """Fixed parts of an episode; the field names are the keys of `reset(options={...})`.
 
-    The record itself may be given, too. The other parts are drawn as without options, from the same
-    random streams. A vector environment takes one value for all environments; for `goal`,
-    `start_q`, `n_workers` and `steps_left` also an array with a row for each environment; and for
-    all fields "each", a list of a mapping (or None) for each environment. `set_options` takes all
-    fields except `steps_left`, for all resets to come, those after the end of an episode included.
+    An instance of this class is also accepted in place of the mapping. All other parts are drawn
+    from the same random streams as without options. A vector environment takes one value for all
+    environments; for `goal`, `start_q`, `n_workers` and `steps_left`, it also takes an array with a
+    row for each environment; and the key "each" takes a list with a mapping (or None) for each
+    environment. `set_options` takes all fields except `steps_left`, for all future resets,
+    including those after the end of an episode.
     """
 
     goal: ArrayLike | None = None
-    """Goal of the task: in `HRCReachGoal-v0`, and as the first one in `HRCReach-v0`, a place
-    (x, y, z) [m, world]. Other tasks take none; a user's own may (`Task.set_goal`)."""
+    """Goal of the task: a position (x, y, z) [m, world] in `HRCReachGoal-v0`, and for the first
+    goal in `HRCReach-v0`. Other built-in tasks take no goal; a custom task may
+    (`Task.set_goal`)."""
     n_workers: int | None = None
-    """Number of workers, at most that for which the environment was made."""
+    """Number of workers; at most the number for which the environment was made."""
     bodies: str | Sequence[str] | None = None
-    """Body of all workers, or of each, by names among `config.worker`."""
+    """Name of the body of all workers, or a list with a name for each, from `config.worker`."""
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
     """Behaviour of workers towards the robot, as for `EnvConfig.people`."""
     activity: "str | Sequence[str | None] | None" = None
-    """First activity of all workers, such as "hammer", or of each (None for a drawn one); further
-    activities are drawn as usual."""
+    """First activity of all workers, such as "hammer", or a list with one for each worker (None for
+    a random one); further activities are drawn as usual."""
     start_q: ArrayLike | None = None
-    """(N,) joint angles with which the robot starts [rad], of slides [m]."""
+    """(N,) initial joint positions of the robot: angles [rad], or displacements of slides [m]."""
     cameras: Any = None
-    """Rig, as for `EnvConfig.cameras`; its cameras have names of the environment's cameras, and may
-    be fewer. From a `RigDistribution` the rig is drawn."""
+    """Rig, as for `EnvConfig.cameras`; its cameras must have names of the environment's cameras,
+    but need not be all of them. From a `RigDistribution`, the rig is drawn."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = None
     """Faults of cameras, which replace the environment's `faults`."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """Appearance of scene and workers, which replaces the environment's `appearance`."""
     steps_left: int | None = None
-    """Number of steps after which the episode is truncated, unless its time limit ends it before.
-    """
+    """Number of steps after which the episode is truncated, unless the time limit ends it
+    earlier."""
 
 
 NAMES = tuple(each.name for each in dataclasses.fields(ResetOptions))
 """Names of the options."""
 OF_SEVERAL = ("reset_mask", "each")
-"""Options that only vector environments have."""
+"""Options that only vector environments accept."""
 ONE_RESET = ("steps_left",)
-"""Options for a single reset only."""
+"""Options that `set_options` does not accept, because they apply to a single reset only."""
 Options: TypeAlias = Mapping[str, Any]
-"""Options by name."""
+"""Type of a mapping of options by name."""
 
 
 def named_options(options: Options | ResetOptions | None, *more: str) -> dict[str, Any]:
@@ -92,7 +94,7 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
         more: further valid names.
 
     Raises:
-        ConfigError: a name is no option; the error has the most similar one.
+        ConfigError: a name is unknown; the error suggests the most similar option.
     """
     if isinstance(options, ResetOptions):
         options = {name: getattr(options, name) for name in NAMES}
@@ -110,14 +112,14 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
 
 
 def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[str, Any]:
-    """Return options for all resets to come by name.
+    """Return options for all future resets by name, without those that are None.
 
     Args:
         options: options as a record or a mapping.
         more: further valid names.
 
     Raises:
-        ConfigError: a name is no option, or an option for a single reset.
+        ConfigError: a name is unknown, or is an option for a single reset only.
     """
     given = named_options(options, *more)
     for name in (*ONE_RESET, *more):
@@ -131,9 +133,9 @@ def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fixed:
-    """Checked parts of one environment's episode that are fixed.
+    """Fixed parts of one environment's episode, after they have been checked.
 
-    A part that is None is drawn, or the environment's own.
+    A part that is None is drawn, or is that with which the environment was made.
     """
 
     goal: Floats | None = None
@@ -141,9 +143,9 @@ class Fixed:
     cast: Cast | None = None
     """Number, bodies, first activities and behaviour of the workers."""
     start_q: JointAngles | None = None
-    """(N,) joint angles with which the robot starts [rad], of slides [m]."""
+    """(N,) initial joint positions of the robot: angles [rad], or displacements of slides [m]."""
     rig: tuple[CameraConfig, ...] | None = None
-    """The rig, or the nominal rig of `rigs`."""
+    """Fixed rig, or the nominal rig of `rigs`."""
     rigs: RigDistribution | None = None
     """Distribution from which the rig is drawn."""
     faults: tuple[FaultConfig, ...] | None = None
@@ -153,7 +155,7 @@ class Fixed:
 
     @property
     def changes_cameras(self) -> bool:
-        """Whether the cameras differ from those with which the environment was made."""
+        """Whether rig, faults or appearance are fixed, rather than those of the environment."""
         return any(each is not None for each in (self.rig, self.rigs, self.faults, self.appearance))
 
 
@@ -176,17 +178,17 @@ class Room:
     bodies: tuple[str, ...]
     """Names of the bodies that workers can have."""
     mind: BehaviourParams
-    """Parameters of the workers' decisions."""
+    """Parameters of the workers' behaviour."""
     find_contact: Callable[[JointAngles], str | None]
-    """Function that returns the names of two geoms that touch at joint angles, or None."""
+    """Function of joint angles that returns the names of two geoms in contact, or None."""
     images: ObservedImages | None = None
     """Renderer of the images in observations; None without images."""
     wants_pairs: str = ""
-    """Name of the estimator if it needs two cameras, else ""."""
+    """Name of the estimator if it needs two cameras; otherwise ""."""
 
 
 class ChosenRig(NamedTuple):
-    """Value of the option `cameras`."""
+    """Parsed value of the option `cameras`."""
 
     rig: tuple[CameraConfig, ...] | None = None
     """The rig, or the nominal rig of the distribution; None without the option."""
@@ -195,14 +197,14 @@ class ChosenRig(NamedTuple):
 
 
 def fix(options: Options, room: Room) -> Fixed:
-    """Return the fixed parts of one environment's episode, before any other part is drawn.
+    """Check the options of one environment's reset, and return the fixed parts of its episode.
 
     Args:
         options: options by name.
         room: settings of the environment.
 
     Raises:
-        ConfigError: an option is invalid, or two exclude each other.
+        ConfigError: an option is invalid, or two options are incompatible.
     """
     given = named_options(options)
     rig, rigs = _rig(given.get("cameras"), room)
@@ -237,7 +239,7 @@ def fix(options: Options, room: Room) -> Fixed:
 
 
 def _goal(goal: Any, room: Room) -> Floats | None:
-    """Return a goal, or raise `ConfigError` if it is invalid or out of reach."""
+    """Return the goal, or raise `ConfigError` if it is invalid or out of reach."""
     if goal is None:
         return None
     try:
@@ -253,7 +255,7 @@ def _goal(goal: Any, room: Room) -> Floats | None:
 
 
 def _start_q(start_q: Any, room: Room) -> JointAngles | None:
-    """Return joint angles, or raise `ConfigError` if they are invalid or in contact."""
+    """Return the joint angles, or raise `ConfigError` if they are invalid or cause a contact."""
     if start_q is None:
         return None
     name, joints = 'options["start_q"]', room.scene.robot.joints
@@ -310,7 +312,7 @@ def _activity_index(name: str | None) -> int:
 
 
 def _one_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
-    """Return one value for each worker, from one for all or a list."""
+    """Return a list with one value for each worker, from a common value or such a list."""
     if value is None:
         return None
     if isinstance(value, str):
@@ -324,7 +326,7 @@ def _one_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
 
 
 def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
-    """Return the parameters of decisions with another behaviour; None for the environment's."""
+    """Return the behaviour parameters for the option `people`; None without the option."""
     if people is None:
         return None
     config = replace(mind.config, people=convert_to_hint(PeopleConfig, people, "people"))
@@ -334,7 +336,7 @@ def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
 
 
 def _rig(cameras: Any, room: Room) -> ChosenRig:
-    """Return the rig of an episode, or raise `ConfigError` if it is invalid."""
+    """Return the rig of the option `cameras`, or raise `ConfigError` if it is invalid."""
     if cameras is None:
         return ChosenRig()
     if isinstance(cameras, np.ndarray):
@@ -344,7 +346,7 @@ def _rig(cameras: Any, room: Room) -> ChosenRig:
         rigs = convert_to_hint(RigDistribution, cameras, "cameras")
         rig = rigs.rig or room.scene.rig
         rigs.counts(len(rig))
-        if room.level in CAMERA_LEVELS:  # to raise its errors here
+        if room.level in CAMERA_LEVELS:  # to raise its errors early
             draw_rig(rigs, with_rig(room.scene, rig), np.random.default_rng(0))
     else:
         own = rig_of(cameras)
@@ -364,7 +366,7 @@ def _rig(cameras: Any, room: Room) -> ChosenRig:
 
 
 def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
-    """Return the faults among options; None if there are none."""
+    """Return the faults in options; None without the option."""
     if "faults" not in given:
         return None
     faults: tuple[FaultConfig, ...] = convert_to_hint(
@@ -374,7 +376,7 @@ def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
 
 
 def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
-    """Return the appearance among options; None if there is none."""
+    """Return the appearance in options; None without the option."""
     if "appearance" not in given:
         return None
     appearance: AppearanceConfig = convert_to_hint(
@@ -386,12 +388,12 @@ def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
 def faults_of(
     faults: Sequence[FaultConfig], names: Sequence[str], rig: Sequence[CameraConfig]
 ) -> tuple[FaultConfig, ...]:
-    """Return the faults of the cameras in an episode's rig.
+    """Return the faults that affect cameras in an episode's rig.
 
     Args:
         faults: faults of the environment's cameras.
         names: names of these cameras.
-        rig: the episode's rig, with some of them.
+        rig: rig of the episode, with a subset of these cameras.
     """
     in_rig, kept = {camera.name for camera in rig}, list[FaultConfig]()
     for fault in faults:

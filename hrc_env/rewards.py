@@ -1,6 +1,6 @@
-"""Rewards: one declaration for each term.
+"""The reward of an environment, composed of terms that are declared once.
 
-Terms about people read the estimate only; progress of the task is measured in the world.
+Terms about people read only the estimate; the progress of the task is measured in the true world.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,11 +21,12 @@ from hrc_env.core.typing import Floats
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardConfig:
-    """Weights of the terms that all tasks share; weights of a task's own terms are in its settings.
+    """Weights of the reward terms that all tasks share.
 
-    A learner that is penalized for closeness before it knows its task learns to stand still, far
-    from people. Let the weight of `proximity` grow from 0 (`set_reward`; `train --ramp`), and
-    compare goals, not returns.
+    The weights of all other terms are among the settings of the task. A learner that is penalized
+    for closeness before it has learned its task learns to stand still, far from people. Increase
+    the weight of `proximity` gradually from 0 (`set_reward`; `train --ramp`), and compare numbers
+    of reached goals instead of returns, which depend on the weights.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {"unknown": "unknown_closeness"}
@@ -36,14 +37,14 @@ class RewardConfig:
     smoothness: float = 0.02
     """Weight of the penalty on the mean squared change of the action."""
     proximity: float = 2.0
-    """Weight of the penalty on closeness to the *estimated* body, a shape in [0, 2.25]. With
-    6 from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
-    before step 135,000; with 0 it reached 5.7 in each."""
+    """Weight of the penalty on closeness to the *estimated* bodies, which is in [0, 2.25]. With a
+    weight of 6 from the first step, PPO (one seed) reached no goal of `HRCReach-v0` in the last 64
+    episodes before step 135,000; with 0, it reached 5.7 goals per episode."""
     proximity_reach_m: float = 0.3
-    """Separation of the surfaces below which closeness counts [m]."""
+    """Separation between the surfaces of robot and body below which closeness is penalized [m]."""
     unknown_closeness: float = 0.25
-    """Least closeness of an unknown worker, in [0, 1], so that losing sight of a worker is not
-    rewarded like being alone."""
+    """Lower bound on the closeness while a worker is unknown, in [0, 1]. With a positive value,
+    losing sight of a worker is not rewarded like being alone."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
@@ -51,7 +52,7 @@ class RewardConfig:
 
 
 KINDS = ("dense", "sparse")
-"""Values of a task's `reward`: with or without a reward for progress."""
+"""Valid values of a task's setting `reward`: with or without a reward for progress."""
 
 
 @answer_unknown_fields
@@ -60,14 +61,15 @@ class RewardTerm:
     """One term of the reward, which is the sum of all terms."""
 
     name: str
-    """Name of the term, which is "reward/NAME" in `info`."""
+    """Name of the term; its value is `info["reward/NAME"]`."""
     doc: str
     """Sentence for the environment's page."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
-    """Function of (belief, step, previous action (B, A), weights) that returns (B,). The step is a
-    task's, as returned by `Task.advance`. The weights are a `RewardConfig`, or the task's settings
-    for its own terms. The belief has for example `separation.distance_m` (B, W),
-    `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J, 3), in metres."""
+    """Function of (belief, step, previous action (B, A), weights) that returns the values (B,) of
+    the term. The step is the result of `Task.advance`. The weights are a `RewardConfig` for shared
+    terms, and the task's settings for terms of the task. Useful fields of the belief are
+    `separation.distance_m` (B, W), `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J,
+    3), all in metres."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take four arguments."""
@@ -76,17 +78,17 @@ class RewardTerm:
 
 
 def check_kind(config: Any) -> None:
-    """Raise `ConfigError` for settings of a task with a `reward` that is not one of `KINDS`."""
+    """Raise `ConfigError` if the setting `reward` of a task is not one of `KINDS`."""
     if config.reward not in KINDS:
         name = type(config).__name__
         raise ConfigError(f'{name}.reward must be "dense" or "sparse", got {config.reward!r}.')
 
 
 def progress(description: str) -> RewardTerm:
-    """Return the progress term of a task with `progress_m` in its steps.
+    """Return the reward term for progress, for a task with `progress_m` in the result of its steps.
 
-    It is the decrease of the remaining distance: as differences of a potential, its values add up
-    to no more than the initial distance.
+    Progress is the decrease of the remaining distance, a difference of potentials. Therefore its
+    sum over an episode does not exceed the initial distance.
     """
     doc = f'{description}, times `task.progress_per_m`; 0 with `task.reward` "sparse".'
     return RewardTerm("progress", doc, _progress)
@@ -99,7 +101,7 @@ def _progress(belief: Belief, step: Any, previous: Floats, config: Any) -> Float
 
 
 def closeness(separation_m: Floats, reach_m: float) -> Floats:
-    """Return the shape of the proximity term: 0 from `reach_m` on, 1 at contact, at most 2.25."""
+    """Return the shape of the proximity term: 0 beyond `reach_m`, 1 at contact, 2.25 at most."""
     share = np.minimum(np.maximum((reach_m - separation_m) / reach_m, 0.0), 1.5)
     return share * share
 
@@ -116,7 +118,7 @@ def _mean_square(vectors: Floats) -> Floats:
 
 
 def _proximity(belief: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
-    """Return the reward (B,) for distance from estimated bodies."""
+    """Return the negative reward (B,) for closeness to estimated bodies."""
     nearest_m = np.minimum.reduce(belief.separation.distance_m, axis=-1, initial=np.inf)
     least = np.where(belief.estimate.unknown.any(-1), config.unknown_closeness, 0.0)
     near = np.maximum(closeness(nearest_m, config.proximity_reach_m), least)
@@ -149,13 +151,13 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
 def evaluate_terms(
     terms: tuple[RewardTerm, ...], belief: Belief, step: Any, previous_action: Floats, weights: Any
 ) -> dict[str, Floats]:
-    """Return the values of terms; functions of users get read-only arrays.
+    """Compute the values of reward terms; functions of users receive read-only arrays.
 
     Args:
         terms: the terms.
         belief: beliefs of B robots.
         step: result of `Task.advance`.
-        previous_action: (B, A) action of the step before.
+        previous_action: (B, A) actions of the previous step.
         weights: a `RewardConfig`, or the settings of the task.
 
     Returns:
@@ -174,7 +176,7 @@ def evaluate_terms(
 
 
 def check_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:
-    """Return factors on terms by name; `ConfigError` for an unknown name or no finite number."""
+    """Return factors on terms by name; raise `ConfigError` for unknown names or invalid factors."""
     names = [term.name for term in terms]
     check_names("reward term", factors, names)
     for name, factor in factors.items():
@@ -194,8 +196,8 @@ def sum_terms(terms: Mapping[str, Floats], batch: int) -> Floats:
         batch: number B of environments.
 
     Raises:
-        ConfigError: a term has another shape.
-        FloatingPointError: a term is not finite, which is an error in code and never due to a
+        ConfigError: the shape of a term is wrong.
+        FloatingPointError: a term is not finite, which is due to an error in code and never to a
             camera.
     """
     for name, value in terms.items():

@@ -36,28 +36,31 @@ with learner():
     from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 REPLACED = (Monitor, OrderEnforcing)
-"""Wrappers of one environment that this `VecEnv` replaces, beside `TimeLimit`."""
+"""Wrappers of a single environment that `HRCVecEnv` replaces, in addition to `TimeLimit`."""
 
 
 class HRCVecEnv(VecEnv):
-    """An `HRCVectorEnv` in the form of SB3's `VecEnv`, with the statistics of episodes.
+    """An `HRCVectorEnv` with the interface of SB3's `VecEnv` and the statistics of `Monitor`.
 
-    Environment k after `seed(s)` and `reset()` is the single environment after `reset(seed=s + k)`.
+    After `seed(s)` and `reset()`, environment k is in the same state as the single environment
+    after `reset(seed=s + k)`.
 
-    The info of a step has only its "cost"; with goals also the other terms of the reward, for HER
-    with `copy_info_dict`. At the end of an episode it has all infos, "terminal_observation",
-    "TimeLimit.truncated" and the statistics "episode", so that no `Monitor` is needed. `infos=`
-    adds infos to every step, for wrappers that shape the reward or count. Infos "reward/..." follow
-    from the belief; "cost", "safety/...", "tracking/..." and "worker_N/..." follow from the truth,
-    which no robot knows (docs/reference/infos.md). Attributes and methods of one environment are
-    those of `hrc_env.vector.member.Member`.
+    The info of a step contains only "cost" and, if the task has goals, the terms of the reward that
+    do not depend on the goal, for HER with `copy_info_dict`. At the end of an episode it contains
+    all infos, "terminal_observation", "TimeLimit.truncated" and the statistics "episode"; therefore
+    no `Monitor` is needed. `infos=` adds infos to every step, for example for wrappers that shape
+    the reward. Infos "reward/..." are computed from the belief; "cost", "safety/...",
+    "tracking/..." and "worker_N/..." are computed from the truth, which is unavailable to robots
+    (docs/reference/infos.md). `hrc_env.vector.member.Member` describes the attributes and methods
+    of one environment.
 
     Args:
         num_envs: number of environments.
-        stagger: whether, after a `seed()`, the first episode of each environment ends early at a
-            random time, so that a short rollout has all phases of an episode; not for evaluation.
+        stagger: whether the first episode of each environment after `seed()` ends early, at a
+            random time, so that a short rollout covers all phases of an episode; not for
+            evaluation.
         seed: seed of the first reset.
-        infos: names of infos that every step has, or patterns such as "safety/*".
+        infos: names of infos to include in every step, or patterns such as "safety/*".
         kwargs: arguments of `HRCVectorEnv`.
 
     Raises:
@@ -75,7 +78,7 @@ class HRCVecEnv(VecEnv):
     ) -> None:
         check_keywords(HRCVecEnv, kwargs, HRCVectorEnv)
         self.info_names = choose_infos(infos, kwargs)
-        """Names of the infos that were chosen for every step."""
+        """Names of the infos that every step includes."""
         self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
         space, actions = self.env.single_observation_space, self.env.single_action_space
         self._past: list[list[Past]] = [[] for _ in range(num_envs)]
@@ -91,7 +94,7 @@ class HRCVecEnv(VecEnv):
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation of the environments; of several, the first."""
+        """Simulation of the environments; the first one if they are distributed over several."""
         return self.env.shards.first
 
     @property
@@ -100,7 +103,7 @@ class HRCVecEnv(VecEnv):
         return self._member(0).spec
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
-        """Seed environment k with seed + k at the next reset; None draws a seed."""
+        """Set the seed of environment k at the next reset to seed + k; None draws a seed."""
         seeds = list(super().seed(seed))
         self._phases = np.random.default_rng(seeds[0]) if self.stagger else None
         return seeds
@@ -108,14 +111,14 @@ class HRCVecEnv(VecEnv):
     def set_options(self, options: Any = None) -> None:
         """Set the options of the next reset.
 
-        `env_method("set_options", options)` sets them for all resets to come.
+        `env_method("set_options", options)` sets the options of all future resets.
 
         Args:
             options: options of one environment, as for `HRCVectorEnv.reset`: a mapping for all
                 environments, or a list with one for each.
 
         Raises:
-            ConfigError: an option is unknown or invalid, or the list has another length.
+            ConfigError: an option is unknown or invalid, or the list has the wrong length.
         """
         each = _one_each(options, self.num_envs)
         for k, one in enumerate(each):
@@ -123,7 +126,7 @@ class HRCVecEnv(VecEnv):
         super().set_options([dict(named_options(one, *ALONE)) for one in each])
 
     def reset(self) -> Observation:  # type: ignore[override]
-        """Start an episode of every environment, the first from its seed, later from its stream."""
+        """Start an episode of every environment, with new seeds if `seed` was called before."""
         limit = self.env.max_episode_steps
         elapsed = np.zeros(self.num_envs, int)
         if self._phases is not None:
@@ -167,7 +170,7 @@ class HRCVecEnv(VecEnv):
         return observation, reward.astype(np.float32), done, infos
 
     def _infos(self, fresh: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the infos of every step: cost, terms beside the goal's, and the chosen infos."""
+        """Return the infos of a step: cost, reward terms except the goal's, and chosen infos."""
         columns = {"cost": self.costs}
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
@@ -180,7 +183,7 @@ class HRCVecEnv(VecEnv):
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Set the weights of the reward's terms in all environments, as `HRCEnv.set_reward`."""
+        """Set the weights of the reward's terms in all environments, like `HRCEnv.set_reward`."""
         self.env.set_reward(weights, factors)
 
     def close(self) -> None:
@@ -190,7 +193,7 @@ class HRCVecEnv(VecEnv):
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """Return a picture of every environment.
 
-        Without the render mode "rgb_array" it warns, and returns None for each.
+        If the render mode is not "rgb_array", issue a warning and return None for each environment.
         """
         if self.render_mode != "rgb_array":
             warnings.warn(
@@ -201,28 +204,28 @@ class HRCVecEnv(VecEnv):
         return list(self.env.render() or ())
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
-        """Return the statistics of an episode, those of SB3's Monitor under its names."""
+        """Return the statistics of an episode, with the names that SB3's `Monitor` uses."""
         task, dt_s = self.simulation.task, self.env.config.ctrl_dt
         episode = self._sums.summarize(b, info, task, dt_s)
         return {**episode, "t": time.time() - self.started_s}
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of each of the environments."""
+        """Return the values of an attribute in the chosen environments."""
         return [getattr(self._member(k), attr_name) for k in self._choose(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set `np_random` or a user's own attribute, or raise `ConfigError` for a setting."""
+        """Set `np_random` or a custom attribute; raise `ConfigError` for a setting."""
         for k in self._choose(indices):
             setattr(self._member(k), attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of each environment and return the results.
+        """Call a method of each chosen environment and return the results.
 
         Raises:
             NoAttributeError: there is no such method.
-            ConfigError: it is a method for all environments together only.
+            ConfigError: the method can be called only for all environments together.
         """
         chosen = self._choose(indices)
         if method_name not in TOGETHER:
@@ -235,19 +238,19 @@ class HRCVecEnv(VecEnv):
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * len(chosen)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return whether a wrapper is among the replaced ones, for each environment."""
+        """Return for each environment whether a wrapper is among those that this class replaces."""
         limited = self.env.max_episode_steps != ENDLESS
         done = (*REPLACED, TimeLimit) if limited else REPLACED
         wrapped = any(issubclass(each, wrapper_class) for each in done)
         return [wrapped] * len(self._choose(indices))
 
     def _choose(self, indices: Any) -> list[int]:
-        """Return the indices of the chosen environments; -1 is the last, as in a list."""
+        """Return the indices of the chosen environments; negative indices count from the end."""
         n = self.num_envs
         return [check_integer("indices", k, -n, n - 1) % n for k in self._get_indices(indices)]
 
     def _member(self, k: int) -> "MonitoredMember":
-        """Return environment `k` alone."""
+        """Return a handle of environment `k`."""
         return MonitoredMember(self, k)
 
     def past_of(self, k: int) -> list["Past"]:
@@ -259,33 +262,34 @@ class HRCVecEnv(VecEnv):
         return int(self._n_steps[k])
 
     def begin_alone(self, k: int, info: dict[str, Any]) -> None:
-        """Begin the statistics of environment `k`, which was reset alone, with this info."""
+        """Restart the statistics of environment `k` after it was reset individually."""
         self._sums.begin(np.array([k]))
         self.costs = np.where(np.arange(self.num_envs) == k, 0.0, self.costs)
         self.reset_infos[k] = info
 
 
 class HRCSubprocVecEnv(SubprocVecEnv):
-    """SB3's `SubprocVecEnv`, in which errors of options are raised and all processes continue.
+    """SB3's `SubprocVecEnv`, in which an error in options does not end a subprocess.
 
     PPO("MlpPolicy", make_vec_env("HRCReach-v0", 4, env_kwargs={"perception": "pixels"},
         vec_env_cls=HRCSubprocVecEnv))
 
-    It is for perception="pixels", which cannot be batched; `HRCVecEnv` is faster at other levels.
-    With SB3's own class, the process of the environment ends, and the error is an `EOFError`.
+    It is intended for perception="pixels", which cannot be batched; `HRCVecEnv` is faster at other
+    levels. With SB3's class, an error in options ends the environment's subprocess and appears as
+    an `EOFError`; here the error itself is raised.
     """
 
     def set_options(self, options: Any = None) -> None:
         """Set the options of the next reset.
 
-        `env_method("set_options", options)` sets them for all resets to come.
+        `env_method("set_options", options)` sets the options of all future resets.
 
         Args:
             options: options of one environment: a mapping for all environments, or a list with one
                 for each.
 
         Raises:
-            ConfigError: an option is invalid, or the list has another length.
+            ConfigError: an option is invalid, or the list has the wrong length.
         """
         each = [named_options(one) for one in _one_each(options, self.num_envs)]
         for k, one in enumerate(each):
@@ -293,10 +297,10 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         super().set_options(each)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the outermost wrapper, as SB3 does.
+        """Set an attribute of the outermost wrapper, like SB3 does.
 
         Args:
-            attr_name: name of the attribute; "options", of all resets to come, is set in the
+            attr_name: name of the attribute; "options", for all future resets, is set in the
                 environment itself.
             value: value of the attribute.
             indices: indices of the environments; None for all.
@@ -312,7 +316,7 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         """Call a method of each environment and return the results.
 
         Raises:
-            ConfigError: the arguments are invalid for an environment.
+            ConfigError: an environment rejects the arguments.
         """
         attempt = ("attempt",) if method_name in REFUSING else ()
         name, *args = *attempt, method_name, *method_args
@@ -322,21 +326,21 @@ class HRCSubprocVecEnv(SubprocVecEnv):
 
 
 def _one_each(options: Any, num_envs: int) -> Sequence[Any]:
-    """Return the options of each environment, from one mapping for all or a list."""
+    """Return a list with the options of each environment, from a common mapping or such a list."""
     each = options if isinstance(options, (list, tuple)) else [options] * num_envs
     check_shape("options", (len(each),), (num_envs,), "a mapping for each environment")
     return each
 
 
 class Past(NamedTuple):
-    """Statistics of a finished episode, as `Monitor` has them."""
+    """Statistics of a finished episode, as recorded by `Monitor`."""
 
     reward: float
     """Return of the episode."""
     length: int
     """Length of the episode [control steps]."""
     since_start_s: float
-    """Time of its end since the environments were made [s]."""
+    """Wall-clock time between making the environments and the end of the episode [s]."""
 
 
 class MonitoredMember(Member):
@@ -354,7 +358,7 @@ class MonitoredMember(Member):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode of this environment, and its statistics."""
+        """Start an episode of this environment, and restart its statistics."""
         observation, info = super().reset(seed=seed, options=options)
         self._many.begin_alone(self._k, info)
         return observation, info
@@ -364,13 +368,13 @@ class MonitoredMember(Member):
         return self._many.count_steps(self._k)
 
     def get_episode_rewards(self) -> list[float]:
-        """Return the returns of finished episodes."""
+        """Return the sums of rewards of the finished episodes."""
         return [each.reward for each in self._many.past_of(self._k)]
 
     def get_episode_lengths(self) -> list[int]:
-        """Return the lengths of finished episodes [steps]."""
+        """Return the lengths of the finished episodes [steps]."""
         return [each.length for each in self._many.past_of(self._k)]
 
     def get_episode_times(self) -> list[float]:
-        """Return the ends of finished episodes, since the environments were made [s]."""
+        """Return the end times of the finished episodes, since the environments were made [s]."""
         return [each.since_start_s for each in self._many.past_of(self._k)]

@@ -1,4 +1,4 @@
-"""Resolved and checked arguments of an environment, from which a simulation is made."""
+"""Resolution and checks of an environment's arguments, from which a simulation is made."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,16 +31,16 @@ PARTS = {
     "faults": "faults",
     "appearance": "appearance",
 }
-"""Arguments of an environment that stand for parts of `config`, by their paths in it."""
+"""Paths in `config` of the parts that arguments of an environment replace, by argument."""
 
 
 class WorkerCounts(NamedTuple):
-    """Bounds on the number of workers of an episode."""
+    """Bounds on the number of workers in an episode."""
 
     fewest: int
-    """Least number of workers."""
+    """Smallest number of workers."""
     most: int
-    """Greatest number of workers."""
+    """Largest number of workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ class Settings:
     """Checked settings of a simulation."""
 
     asked: EnvConfig
-    """Arguments of the environment, as they were given."""
+    """Arguments with which the environment was made."""
     task: AnyTask
-    """The task with its settings."""
+    """The task, an instance with its settings."""
     estimator: EstimatorSpec
     """The estimator."""
     cameras: Any
@@ -60,18 +60,19 @@ class Settings:
     robot: Robot
     """The robot."""
     n_workers: WorkerCounts
-    """Bounds on the number of workers of an episode."""
+    """Bounds on the number of workers in an episode."""
     shield: Shield | None
-    """The shield; None without one."""
+    """The shield; None for no shield."""
     config: HRCConfig
     """All other settings."""
     images: ImageConfig | None = None
-    """Images of cameras in the observation; None without images."""
+    """Settings of the camera images in the observation; None for no images."""
     rigs: RigDistribution | None = None
-    """Distribution from which every episode's rig is drawn; None for the same rig in all."""
+    """Distribution from which every episode's rig is drawn; None if all episodes have the same
+    rig."""
 
     def describe(self, batch: int, scene: Scene) -> dict[str, Any]:
-        """Return the settings that a state and the simulation that takes it must share.
+        """Return the settings that must be equal for a state to be restored in another simulation.
 
         Args:
             batch: number of environments.
@@ -94,7 +95,7 @@ class Settings:
 
 
 def resolve_settings(**arguments: Any) -> Settings:
-    """Return settings from keyword arguments of an environment; see `make_settings`."""
+    """Return checked settings for keyword arguments of an environment, like `make_settings`."""
     return make_settings(EnvConfig(**arguments))
 
 
@@ -155,7 +156,7 @@ def make_settings(asked: EnvConfig) -> Settings:
 
 
 def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
-    """Return the rig for a value of `cameras=`; None if it selects cameras of the scene."""
+    """Return the rig for a value of `cameras`; None if it selects cameras of the scene."""
     if isinstance(cameras, str | Path):
         if str(cameras).endswith(".toml"):
             return read_rig(cameras)
@@ -172,7 +173,7 @@ def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
 
 
 def _camera(given: Any, index: int) -> CameraConfig:
-    """Return a camera of a rig, from a record, a mapping or a place, or raise `ConfigError`."""
+    """Parse a rig's camera from a record, a mapping or a position, or raise `ConfigError`."""
     if isinstance(given, CameraConfig):
         return given
     if isinstance(given, Mapping):
@@ -188,7 +189,7 @@ def _camera(given: Any, index: int) -> CameraConfig:
 
 
 def _parse_worker_counts(n_workers: int | tuple[int, int]) -> WorkerCounts:
-    """Return the bounds on the number of workers, from one number or from both."""
+    """Return the bounds on the number of workers, from one number or a pair of bounds."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
     are_whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not are_whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
@@ -200,13 +201,13 @@ def _parse_worker_counts(n_workers: int | tuple[int, int]) -> WorkerCounts:
 
 
 def _with_part(record: RecordT, path: str, value: object, argument: str) -> RecordT:
-    """Return a record with another value of a field.
+    """Return a copy of a record in which the value of a field is replaced.
 
     Args:
         record: the record.
         path: path of the field, such as "motion.people".
-        value: the new value, as a user gives it.
-        argument: name of the argument, for errors.
+        value: the new value, as passed by the user.
+        argument: name of the argument, for error messages.
     """
     name, _, rest = path.partition(".")
     if rest:

@@ -1,7 +1,7 @@
 """The closed loop of a batch of environments: act, move, perceive, judge.
 
-`HRCEnv` is a simulation of one. Results of environment b depend on its own random streams only,
-never on the size of the batch.
+`HRCEnv` is a simulation with a batch of one. The results of environment b depend only on the random
+streams of that environment, never on the size of the batch.
 """
 
 import warnings
@@ -53,51 +53,51 @@ from hrc_env.worker.body import load_bodies, select_bodies, worker_capsules, wor
 from hrc_env.world import WorkerProgress, World
 
 CLOSING_M_S = 8.0
-"""Upper bound on the speed at which robot and worker approach each other [m/s]; the greatest in
-some 290,000 steps of robots that were driven to and fro at their limits was 3.4."""
+"""Upper bound on the speed at which robot and worker approach each other [m/s]. The maximum in
+about 290,000 steps of robots that moved back and forth at their limits was 3.4."""
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
-"""Random streams of an environment, in the order in which their generators are spawned; the
-workers' motion does not depend on their perception."""
+"""Random streams of an environment, in the order in which their generators are spawned. They are
+separate, so that the workers' motion does not depend on the perception."""
 MEASURING = "objects"
-"""Random stream of the measurement of loose objects, spawned from that of the task."""
+"""Random stream for measurements of loose objects, spawned from that of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """Command of the robots in a step."""
+    """Commands of the robots in a step."""
 
     velocities: JointVelocities
-    """(B, N) joint velocities after the shield [rad/s], of slides [m/s]."""
+    """(B, N) joint velocities that the shield allows [rad/s], of slides [m/s]."""
     previous_action: Floats
-    """(B, A) action of the step before."""
+    """(B, A) actions of the previous step."""
     shield_info: Info
     """Infos of the shield; empty without a shield."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The true state of the world, for sensors, task, cost and metrics; no belief reads it."""
+    """The true state of the world for sensors, task, cost and metrics; beliefs never read it."""
 
     ids: Ints
-    """(B,) environments of the rows."""
+    """(B,) index of the environment of each row."""
     world: World
-    """Robots with their loads, and objects."""
+    """State of the robots, including their loads, and of the objects."""
     motion: WorkerMotion
     """Poses and velocities of the workers' bodies."""
     workers: WorkerTruth
     """Joints and capsules of the workers."""
     paths: Paths | None = None
-    """Paths of robots and workers in a step; None at the start of an episode."""
+    """Paths of robots and workers during a step; None at the start of an episode."""
     task_step: Any = None
-    """Results of the step for the task (`Task.advance`)."""
+    """Result of the task's step, as returned by `Task.advance`."""
 
 
 class Simulation(Stateful):
-    """Environments with the same settings that step together.
+    """A batch of environments with the same settings that step together.
 
     Args:
-        batch: number of environments, B.
-        settings: settings of all of them.
+        batch: number B of environments.
+        settings: settings that the environments share.
     """
 
     CHANGES = (
@@ -167,12 +167,13 @@ class Simulation(Stateful):
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
         self.estimates = tuple(oracle.estimate_prior(*made) for _ in (0.0, *config.forecast_s))
-        """The belief about the workers now, and its forecast for each of `forecast_s`."""
+        """Estimates of the workers: the present one, and a forecast for each of `forecast_s`."""
         self.identities = metrics.make_identities(batch, self.scene.n_workers)
         self.keys: list[str] = []
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         self.measured = handling.make_world(self.physics, self._everyone, robot).objects
-        """The last measurement of the task's loose objects; None for a task without."""
+        """The last measurement of the task's loose objects; None for a task without loose
+        objects."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
     def reset(
@@ -181,12 +182,12 @@ class Simulation(Stateful):
         """Begin new episodes of environments `ids`.
 
         Args:
-            ids: (n,) the environments in question, sorted.
-            rngs: n generators, one for each.
-            fixed: fixed parts of each episode; empty for none.
+            ids: (n,) sorted indices of the environments.
+            rngs: n random generators, one for each of these environments.
+            fixed: fixed parts of each episode; empty if there are none.
 
         Returns:
-            The result of these environments, n rows.
+            The result of these environments, with n rows.
         """
         given = {b: each for b, each in zip(ids.tolist(), fixed, strict=False) if each is not None}
         self._spawn_streams(ids, rngs)
@@ -210,7 +211,7 @@ class Simulation(Stateful):
         """Return the fixed parts of one environment's episode.
 
         Raises:
-            ConfigError: an option is invalid, or two exclude each other.
+            ConfigError: an option is invalid, or two options are incompatible.
         """
         room = Room(
             task=self.task,
@@ -234,11 +235,11 @@ class Simulation(Stateful):
 
         Args:
             weights: weights of the terms that all tasks share; None keeps them.
-            factors: factors on any terms by name, the task's own included; other terms have the
-                factor 1. None keeps the factors.
+            factors: factors on any terms by name, also on those of the task; all other terms have
+                the factor 1. None keeps the factors.
 
         Raises:
-            ConfigError: a term is unknown, or a factor is no finite number.
+            ConfigError: a term is unknown, or a factor is not a finite number.
         """
         if not isinstance(weights, RewardConfig | None):
             raise ConfigError(
@@ -256,16 +257,16 @@ class Simulation(Stateful):
         return self.cameras.rig_of(b)
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the cameras of environment b's episode with their matrices."""
+        """Return the pinhole cameras of environment b's episode, with their matrices."""
         return self.cameras.cameras_of(b)
 
     def get_state(self) -> State:
-        """Return a copy of the whole state, generators and settings included."""
+        """Return a copy of the complete state, including random generators and settings."""
         factors = {"reward_factors": self.reward_factors} if self.reward_factors else {}
         return {"settings": self.settings, **super().get_state(), **factors}
 
     def set_state(self, state: State) -> None:
-        """Restore a state that was taken with the same settings, bit for bit."""
+        """Restore the exact state that `get_state` returned with the same settings."""
         for name in {**self.settings, **state["settings"]}:
             taken, value = state["settings"].get(name), self.settings.get(name)
             if taken != value:
@@ -277,11 +278,11 @@ class Simulation(Stateful):
         self.reward_factors = dict(state.get("reward_factors", {}))
 
     def draw_images(self) -> Images:
-        """Return the observed images of the sensors' last moment."""
+        """Render the images in the observation at the time of the sensors' last exposure."""
         return self.cameras.draw_images(self.streams["sensor"])
 
     def look_of(self, b: int) -> Look | None:
-        """Return the look of environment `b` in its episode; None for the scene as built."""
+        """Return the appearance drawn for environment b's episode; None for the scene as built."""
         return self.cameras.look_of(b, self.streams["sensor"][b])
 
     def close(self) -> None:
@@ -290,7 +291,7 @@ class Simulation(Stateful):
 
     @property
     def pipeline(self) -> PerceptionPipeline:
-        """The perception of the episodes' cameras."""
+        """Perception pipeline of the current episodes."""
         return self.cameras.pipeline
 
     @property
@@ -300,12 +301,12 @@ class Simulation(Stateful):
 
     @property
     def estimate(self) -> PoseEstimate:
-        """The belief about the workers now."""
+        """Present estimate of the workers."""
         return self.estimates[0]
 
     @property
     def terms(self) -> tuple[observations.ObservationTerm, ...]:
-        """Terms of the observation in their order."""
+        """Terms of the observation, in order."""
         more = observations.SHIELD_TERMS if self.config.observe_shield else ()
         return (*self.task.observation_terms, *more)
 
@@ -316,18 +317,18 @@ class Simulation(Stateful):
 
     @property
     def belief(self) -> Belief:
-        """The belief of every robot now."""
+        """Present belief of every robot."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world = handling.make_world(self.physics, self._everyone, robot)
         return self._believe(self._everyone, self._load(world), self.estimates)
 
     def markers(self, b: int) -> Points3:
-        """Return (M, 3) the markers of environment `b`'s task [m, world]."""
+        """Return the positions (M, 3) of the markers of environment `b`'s task [m, world]."""
         view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
 
     def _make_people_and_scene(self, settings: Settings) -> None:
-        """Make the workers and the scene, or raise `ConfigError` if they do not fit."""
+        """Make the workers and the scene, or raise `ConfigError` if the space is insufficient."""
         config, (fewest, most) = settings.config, settings.n_workers
         build_scene = partial(
             build,
@@ -339,7 +340,7 @@ class Simulation(Stateful):
             task_scene=self.task.make_scene(),
         )
         grounds = build_scene(n_workers=0).grounds
-        try:  # before the scene, as this checks the room for workers and clips
+        try:  # before the scene, because this checks the space for workers and clips
             self.motion = generator.make_state(
                 self.batch,
                 most,
@@ -368,8 +369,8 @@ class Simulation(Stateful):
         """Reset workers, robots, objects and the task of environments `ids`.
 
         Args:
-            ids: (n,) the environments in question.
-            given: fixed parts of their episodes by environment.
+            ids: (n,) indices of the environments.
+            given: fixed parts of the episodes by environment.
         """
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         self.shield_change[ids] = 0.0
@@ -399,7 +400,7 @@ class Simulation(Stateful):
         return Truth(ids, world, motion, worker_truth(self.bodies, motion))
 
     def _act(self, action: Floats) -> Command:
-        """Return the joint velocities for actions; the shield may change them, given the belief."""
+        """Convert actions to joint velocities, which the shield may change based on the belief."""
         previous, self.action = self.action, np.array(action, float)
         command = joint_command(
             self.control,
@@ -416,7 +417,7 @@ class Simulation(Stateful):
         return Command(allowed, previous, dict(info))
 
     def _move(self, command: Command) -> Truth:
-        """Advance workers, robots and the task by a control step."""
+        """Advance workers, robots and the task by one control step."""
         config, task = self.config, self.task
         path, motion = generator.advance(
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
@@ -441,7 +442,7 @@ class Simulation(Stateful):
         return Truth(self._everyone, world, motion, workers, paths, task_step)
 
     def _show_workers(self, world: World, motion: WorkerMotion) -> WorkerProgress | None:
-        """Show robot and signals to the workers; return their progress if they wait for signals."""
+        """Let workers see robot and signals; return their progress if they wait for signals."""
         seen_world = world.robot.capsules_world[:, self.scene.watched_capsules, 1]
         signal = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, self.config.ctrl_dt, signal)
@@ -469,7 +470,7 @@ class Simulation(Stateful):
         return self._believe(ids, truth.world, estimates)
 
     def _expose(self, truth: Truth) -> None:
-        """Expose the sensor to the world, which no other part of the perception sees."""
+        """Expose the sensor to the world; no other part of the perception has access to it."""
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
@@ -481,9 +482,10 @@ class Simulation(Stateful):
         """Return the belief of the robots of environments `ids`.
 
         Args:
-            ids: (n,) the environments in question.
-            world: of these only; the belief takes the readings of encoders and grippers from it.
-            estimates: the belief about the workers, and its forecasts.
+            ids: (n,) indices of the environments.
+            world: world of these environments, from which readings of encoders and grippers are
+                taken.
+            estimates: estimate of the workers, and its forecasts.
         """
         estimate = estimates[0]
         unseen = find_unseen_floor(world.robot, estimate, self.pipeline.vacancy(ids))
@@ -504,7 +506,7 @@ class Simulation(Stateful):
         return replace(belief, allowed_contact=self.task.allowed_contact(belief))
 
     def _open(self, truth: Truth, belief: Belief) -> StepResult:
-        """Return observations and infos of episodes that begin."""
+        """Return the observations and infos of episodes that begin."""
         ids, task, world = truth.ids, self.task, truth.world
         present, nothing = self.present[ids], np.zeros(len(ids))
         identities = metrics.make_identities(*present.shape)
@@ -520,7 +522,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), nothing, nothing > 0, info)
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
-        """Compute cost and metrics from the truth, reward and observation from the belief."""
+        """Compute cost and metrics from the truth, and reward and observation from the belief."""
         config, paths = self.config, require(truth.paths, "A step's paths")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
@@ -543,7 +545,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), rewards.sum_terms(terms, self.batch), over, info)
 
     def _is_terminal(self, task_step: Any) -> Bools:
-        """Return (B,) whether the task is over after a step."""
+        """Return a mask (B,) of the environments in which the task ends the episode."""
         over = np.asarray(self.task.is_terminal(task_step))
         if over.ndim:
             name = f"{self.task.id}: is_terminal"
@@ -551,7 +553,7 @@ class Simulation(Stateful):
         return over.astype(bool)
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
-        """Return (n, N) the drawn or given joint angles with which robots `ids` (n,) start."""
+        """Return the initial joint angles (n, N) of robots `ids` (n,), drawn or given."""
         rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
@@ -563,14 +565,14 @@ class Simulation(Stateful):
         return q
 
     def _load(self, world: World) -> World:
-        """Return the world with loads as parts of the robots."""
+        """Return a world in which carried loads are parts of the robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
         return handling.attach_load(
             self.scene, world, arm, qpos, self.task.is_load(self.task_state)
         ).world
 
     def _observe(self, belief: Belief) -> Observation:
-        """Return the observations, by name if there are goals or images."""
+        """Compute the observations, which are a dictionary if there are goals or images."""
         flat = observations.observe(belief, self.layout, self.terms)
         separate_goal = self.task.goal
         if separate_goal is None and self.images is None:
@@ -583,7 +585,7 @@ class Simulation(Stateful):
         }
 
     def _reward_terms(self, command: Command, truth: Truth, belief: Belief) -> dict[str, Floats]:
-        """Return the terms (B,) of the reward by name: the task's, then those of all tasks."""
+        """Compute the terms (B,) of the reward by name: those of the task, then the shared ones."""
         own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         step = truth.task_step, command.previous_action
         terms = {
@@ -595,10 +597,10 @@ class Simulation(Stateful):
         return terms
 
     def _episode_info(self, ids: Ints, activity: Ints, happened: Records2[Incident] | None) -> Info:
-        """Return the infos of the episodes of environments `ids` up to now.
+        """Return the infos of the current episodes of environments `ids`.
 
         Args:
-            ids: (n,) the environments in question.
+            ids: (n,) indices of the environments.
             activity: (B, W) index of each worker's activity.
             happened: (B, W) incidents of the step; None in a reset.
         """

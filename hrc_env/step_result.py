@@ -1,4 +1,4 @@
-"""The result of a step or a reset: observation, reward, end, and infos by name."""
+"""Result of a step or a reset: observation, reward, termination, and infos by name."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,36 +12,37 @@ from hrc_env.core.infos import Info, InfoDict, publish
 from hrc_env.core.typing import Bools, Floats
 
 Observation = NDArray[np.float32] | dict[str, NDArray[Any]]
-"""Observations (B, n) float32, or by name if there are goals or images (uint8) beside them."""
+"""Type of observations: (B, n) float32, or a dictionary if there are also goals or images
+(uint8)."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """Result of a step or a reset, one row for each environment."""
+    """Result of a step or a reset, with a row for each environment."""
 
     observation: Observation
     """(B, n) observations, or a dictionary of arrays (B, ...)."""
     reward: Floats
     """(B,) rewards of the step."""
     terminated: Bools
-    """(B,) whether each episode is terminated."""
+    """(B,) whether each episode has terminated."""
     info: Info
     """Infos (B,) by name."""
 
     def info_of(self, b: int) -> InfoDict:
-        """Return the info of one environment, as NumPy scalars."""
+        """Return the info of one environment with NumPy scalars as values."""
         return InfoDict({name: value[b] for name, value in publish(self.info).items()})
 
 
 def check_keys(keys: list[str], info: Info) -> Info:
-    """Return an info if it has the names of the first one.
+    """Return an info, after a check that it has the same names as the first one.
 
     Args:
-        keys: names of the first info; if empty, it is filled.
+        keys: names of the first info; an empty list is filled with the names of this one.
         info: the info.
 
     Raises:
-        ConfigError: it has other names, as those of a shield or a task that come and go.
+        ConfigError: the names differ, for example because a shield or a task returns varying names.
     """
     if not keys:
         keys.extend(info)
@@ -56,7 +57,7 @@ def check_keys(keys: list[str], info: Info) -> Info:
 
 
 def concatenate_results(results: Sequence[StepResult]) -> StepResult:
-    """Return the results of consecutive ranges of a batch as one."""
+    """Concatenate the results of consecutive ranges of a batch."""
     if len(results) == 1:
         return results[0]
     names = results[0].info
@@ -69,7 +70,7 @@ def concatenate_results(results: Sequence[StepResult]) -> StepResult:
 
 
 def _concatenate(parts: Sequence[Any]) -> Observation:
-    """Return the observations of consecutive ranges of a batch as one."""
+    """Concatenate the observations of consecutive ranges of a batch."""
     if not isinstance(parts[0], dict):
         return np.concatenate(parts)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -1,4 +1,4 @@
-"""Check that environments of a task depend neither on each other nor on an outside state."""
+"""Check that a task's environments depend neither on each other nor on state outside of them."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -15,21 +15,21 @@ from hrc_env.step_result import StepResult
 SEEDS = (0, 1)
 """Seed of the first episode of each environment."""
 N_STEPS = 4
-"""Number of control steps after a reset or a restored state."""
+"""Number of control steps after a reset, or after a state was restored."""
 RULE = (
     "All methods work on rows: of environment b draw from rngs[b], write and return the rows of "
     "`ids` only, and take no sum, mean or greatest value over the first axis."
 )
 Numbers = dict[str, Any]
-"""Arrays (B, ...) of a result, by name."""
+"""Type of the arrays (B, ...) of a result, by name."""
 
 
 def check_rows(settings: Settings) -> None:
-    """Play a task with two environments together, with each alone, and from a restored state.
+    """Compare two environments of a task that run together, each alone, and from a restored state.
 
     Raises:
-        ConfigError: results of an environment are different beside others, or after `set_state`;
-            the error names the first difference.
+        ConfigError: the results of an environment change if another one runs beside it, or after
+            `set_state`; the error names the first difference.
     """
     together = _collect(settings, SEEDS)
     for row, seed in enumerate(SEEDS):
@@ -43,7 +43,7 @@ def check_rows(settings: Settings) -> None:
 
 
 def _collect(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
-    """Return all results of `_play` without warnings, which come when an environment is made."""
+    """Collect all results of `_play`, without the warnings of making an environment."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -56,7 +56,7 @@ def _collect(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
 
 
 def _play(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
-    """Yield the results of resets and steps, some of them repeated from a restored state."""
+    """Yield the results of resets and steps, some of which are repeated from a restored state."""
     batch = len(seeds)
     with closing(Simulation(batch, settings)) as simulation:
         everyone = np.arange(batch)
@@ -84,7 +84,7 @@ def _play(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
                 )
             yield after
         again: dict[int, Numbers] = {}
-        for b in everyone.tolist():  # one after the other, as episodes end
+        for b in everyone.tolist():  # one after the other, in the way that episodes end
             rng = np.random.default_rng((seeds[b], 2))
             again[b] = _numbers(simulation.reset(everyone[b : b + 1], [rng]))
         yield {k: np.concatenate([again[b][k] for b in again]) for k in again[0]}

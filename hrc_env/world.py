@@ -1,4 +1,4 @@
-"""Records that scene, workers and tasks exchange: workplaces, objects, signals and the true world.
+"""Records for the exchange between scene, workers and tasks, such as signals and the true world.
 
 A task reads and writes these records; none of them is part of a belief.
 """
@@ -15,30 +15,31 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3, Velocities3
 
 FOOT_M = (-0.75, 0.0, 0.75)
 FOOT_WORLD = np.array(FOOT_M)
-"""Place of the foot of robots that do not drive, in every scene [m]."""
+"""Position of the base of stationary robots in every scene [m]."""
 AWAY_M = 0.43
-"""Distance of loads on the floor or a table ahead of the worker at a workplace [m]."""
+"""Distance between a worker at a workplace and the loads in front, on the floor or a table [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Workplace:
-    """A place where a worker stands and works."""
+    """A location where a worker stands and works."""
 
     name: str
-    """Name of the place, unique in its scene."""
+    """Name of the workplace, unique in its scene."""
     kind: str
     """Kind of work, one of `WORKPLACE_KINDS`."""
     xy_m: tuple[float, float]
-    """Place where the worker stands, x and y in the world [m]."""
+    """Position where the worker stands, x and y in the world frame [m]."""
     yaw_rad: float
-    """Direction in which the worker looks, from world +x [rad]."""
+    """Heading of the worker, measured from world +x [rad]."""
     height_m: float
-    """Height of the work above the floor [m]: of the hands, of the surface with the loads, or of
-    a step; 0 if there is none."""
+    """Height above the floor of the hands at work, of the surface with the loads, or of a step [m];
+    0 if it does not apply."""
     ahead_m: float = AWAY_M
-    """Distance of loads, a cart's handles or a wall ahead of the worker [m]."""
+    """Distance between the worker and the loads, cart handles or wall in front [m]."""
     loads: tuple[str, ...] = ()
-    """Props that lie there at the start, from the bottom up: names of `props.PROPS`."""
+    """Names of the props that are initially stacked there, from the bottom up, from
+    `props.PROPS`."""
 
 
 WORKPLACE_KINDS = (
@@ -53,35 +54,36 @@ WORKPLACE_KINDS = (
     "open",
     "task",
 )
-"""Kinds of workplaces: beside the robot, with the hands in its workspace; at a table; kneeling; at
-a wall; above the head; at materials to lift; at a place where a cart is taken or left; before a
-tread 0.3 m ahead; on open floor; at an object of the task."""
+"""Kinds of workplaces, in this order: beside the robot with the hands in its workspace, at a table,
+on the knees, at a wall, above the head, at a pile of material, at a cart, in front of a step 0.3 m
+ahead, on open floor, and at an object of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grounds:
-    """The floor plan of a scene: the area where people stand, walk and work."""
+    """The floor plan of a scene, with the area where people stand, walk and work."""
 
     walkable_x_m: tuple[float, float]
-    """Least and greatest x of the area where workers stand and walk [m]."""
+    """Minimum and maximum x of the area where workers stand and walk [m]."""
     walkable_y_m: tuple[float, float]
-    """Least and greatest y of that area [m]."""
+    """Minimum and maximum y of the area where workers stand and walk [m]."""
     blocked: Floats
-    """(N, 5) footprints of obstacles on the floor without the robot's pedestal: middle x and y,
-    half length and half width [m], yaw of the length from world +x [rad]."""
+    """(N, 5) footprints of obstacles on the floor, except the robot's pedestal: centre x and y,
+    half length and half width [m], and yaw of the longitudinal axis from world +x [rad]."""
     places: tuple[Workplace, ...]
-    """Workplaces, all of them inside the walkable area and outside of `blocked`."""
+    """Workplaces, which are inside the walkable area and outside of `blocked`."""
     robot_xy_m: tuple[float, float]
-    """Axis of the robot's first joint, x and y in the world [m]; its front looks to world +x."""
+    """Position of the robot's first joint axis, x and y in the world [m]; the robot faces world
+    +x."""
     robot_clearance_m: float
-    """Distance that workers' paths keep from that axis [m]: a pedestal's radius and half a person.
-    """
+    """Distance that workers' paths keep from that axis [m]: the pedestal's radius plus half the
+    width of a person."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Weld:
-    """A connection of two sites that keeps their distance while it is on; at first it is off."""
+    """A connection that keeps the distance of two sites while it is active; initially inactive."""
 
     name: str
     """Name of the weld in `Effects.welded`."""
@@ -90,24 +92,25 @@ class Weld:
     solref: tuple[float, float] = (0.02, 1.0)
     """Stiffness and damping of the constraint: MuJoCo's `solref`."""
     turns: bool = True
-    """Whether the sites' relative rotation is held, too."""
+    """Whether the relative rotation of the sites is also kept."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TaskScene:
-    """A task's part of a scene, in the frame of the robot's foot [m]."""
+    """A task's part of a scene, in the frame of the robot's base [m]."""
 
     mjcf: str = ""
-    """MJCF with bodies of boxes: loose with a free joint and contype 16, fixed with contype 1."""
+    """MJCF with bodies that consist of boxes: loose bodies have a free joint and contype 16, fixed
+    bodies have contype 1."""
     welds: tuple[Weld, ...] = ()
-    """Connections of sites that the task switches on and off."""
+    """Connections of sites that the task activates and deactivates."""
     places: tuple[Workplace, ...] = ()
     """Workplaces at the task's objects, of the kind "task"."""
 
 
 NOTHING = TaskScene()
-"""The part of a task that adds nothing to a scene."""
+"""Scene part of a task that adds nothing to the scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,52 +122,52 @@ class WorkerProgress:
     screws: Ints
     """(B, W) number of screws that each worker has driven."""
     boring: Bools
-    """(B, W) whether each worker drives a screw now."""
+    """(B, W) whether each worker is driving a screw."""
     takes: Bools
-    """(B, W) whether each worker puts out a hand for an object that the robot brings."""
+    """(B, W) whether each worker extends a hand to take an object that the robot brings."""
     grip_world: Points3
-    """(B, W, 3) place of the grip of each worker's active hand [m]."""
+    """(B, W, 3) position of the grip point of each worker's active hand [m]."""
     grip_velocity_world: Velocities3
-    """(B, W, 3) velocity of that grip [m/s]."""
+    """(B, W, 3) velocity of the grip point of each worker's active hand [m/s]."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class WorkerSignal:
-    """A task's signal to workers that wait for it."""
+    """A task's signal to the workers that wait for it."""
 
     stage: Ints
-    """(B,) stage of the task: 0 while workers wait, 1 from when they may begin, 2 from when an
-    object is theirs."""
+    """(B,) stage of the task: 0 while workers wait, 1 when they may begin, 2 after one of them has
+    taken an object."""
     offered_world: Points3
-    """(B, 3) place where an object is offered [m]; NaN if none is."""
+    """(B, 3) position at which an object is offered [m]; NaN if none is offered."""
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The true state of robot and objects, from which a task is judged; a row an environment."""
+    """The true state of robots and objects, by which a task is judged; a row per environment."""
 
     robot: RobotState
-    """Joints and tool, by the robot's own encoders."""
+    """Joints and tool of the robot, as measured by the robot's encoders."""
     hand: HandState | None = None
-    """State of the gripper; None for an arm without."""
+    """State of the gripper; None for an arm without a gripper."""
     objects: ObjectState | None = None
-    """True poses and velocities of the task's loose objects; None for a task without."""
+    """True poses and velocities of the task's loose objects; None for a task without objects."""
     workers: WorkerProgress | None = None
     """Progress of workers that wait for signals (`Task.signal`); None if no worker waits, and at
     the start of an episode."""
     touched: Bools | None = None
-    """(B,) whether the robot touched a worker in this step. It is the truth: use it for the
-    success of an episode, not for a reward or an observation."""
+    """(B,) whether the robot touched a worker in this step. Because it is the truth, use it for the
+    success of an episode, but not for a reward or an observation."""
     place: Any = None
-    """The task's own map of the place, as `Task.survey` returned it."""
+    """The task's map of the scene, as returned by `Task.survey`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """Welds and external forces of a task on its loose objects in a step."""
+    """Welds and external forces that a task applies to its loose objects in a step."""
 
     welded: Mapping[str, Bools]
-    """(B,) whether each of the task's welds is on, by its name."""
+    """(B,) whether each of the task's welds is active, by its name."""
     push_world: Floats
-    """(B, O, 6) force [N] and torque [Nm] at the middle of each object, in the world frame."""
+    """(B, O, 6) force [N] and torque [Nm] at the centre of each object, in the world frame."""

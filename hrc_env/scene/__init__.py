@@ -1,5 +1,5 @@
-"""The simulated world: the only room that imports mujoco."""
+"""The simulated world, the only subpackage that imports MuJoCo."""
 
 from hrc_env.scene import gl
 
-gl.import_mujoco()  # chooses its OpenGL, which it reads at its first import
+gl.import_mujoco()  # choose the OpenGL backend before mujoco reads it

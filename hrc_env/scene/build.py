@@ -1,4 +1,4 @@
-"""Build a compiled scene from settings: room, robot, workers and cameras."""
+"""Construction of a compiled scene from settings: room, robot, workers and cameras."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,43 +41,48 @@ from hrc_env.worker.props import held_shapes
 from hrc_env.world import NOTHING, Grounds, TaskScene
 
 ARENA_BYTES = 2**20
-"""Memory of one simulation for contacts [bytes]; an arm in a pile of workers takes a tenth."""
+"""Memory for the contacts of one simulation [bytes], ten times that of an arm in a pile of
+workers."""
 PAIR_BYTES = 1280
-"""Memory for pairs of workers [bytes]: MuJoCo takes about 990 times their squared number."""
+"""Memory per squared number of workers [bytes], of which MuJoCo needs about 990."""
 HARD = {"solimp": [0.95, 0.99, 0.001, 0.5, 2.0]}
-"""Impedance of contacts with light objects. MuJoCo's contacts are softer for lighter bodies: with
-its default an arm presses wood a centimetre into the floor."""
+"""Impedance of contacts with light objects. MuJoCo's contacts are softer for lighter bodies; with
+the default, an arm presses wood a centimetre into the floor."""
 GRIPPING = {"condim": 4, "friction": [1, 1, 0.02, 0.0005, 0.0005], "solref": [0.008, 1.0], **HARD}
-"""Contacts of rubber pads."""
+"""Contact parameters of rubber pads."""
 LYING = {"condim": 3, "friction": [0.6, 0.6, 0.005, 0.0001, 0.0001], "solref": [0.01, 1.0], **HARD}
-"""Contacts of wood."""
+"""Contact parameters of wood."""
 THROWN_M = 1.5
-"""Distance beyond the robot's reach within which loose objects touch fixed ones [m]."""
+"""Distance beyond the robot's reach within which contacts of loose objects with fixed ones are
+computed [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class SceneConfig:
-    """Contents of the scene, and time step and limits of its physics."""
+    """Contents of the scene, and the time step and limits of its physics."""
 
     clutter: bool = True
-    """Whether furniture and building material stand in the room."""
+    """Whether the room contains furniture and building material."""
     sim_dt: float = 0.008
-    """Length of a physics substep [s]: the longest of those tried that keeps the tool within 1 mm
-    (95 %) of the integral of smooth commands, and contacts shallow and calm."""
+    """Duration of a physics substep [s]. The default is the longest tested one for which the tool
+    stays within 1 mm (95 %) of the integral of smooth commands, and contacts are shallow and
+    stable."""
     slew_rad_s2: float = 8.0
-    """Limit on the change of a commanded joint velocity, for an overshoot below 5 % [rad/s^2]."""
+    """Limit on the rate of change of a commanded joint velocity [rad/s^2]; the default keeps the
+    overshoot below 5 %."""
     integrator_clamp_rad: float = 0.05
-    """Limit on the lead of the holding servo's angle over a blocked joint [rad]."""
+    """Limit on the difference between the holding servo's angle and that of a blocked joint
+    [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
-    """All cameras of the scene, of which `build` may use a selection; empty for the scene's own
-    four."""
+    """All cameras of the scene, from which `build` may select some; empty for the four default
+    cameras of the scene."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "sim_dt", "slew_rad_s2", "integrator_clamp_rad")
 
 
 class Recipe(NamedTuple):
-    """Arguments from which `build` makes a scene, in its order."""
+    """Arguments of `build` from which a scene is made, in order."""
 
     config: SceneConfig
     """Settings of the scene."""
@@ -86,7 +91,7 @@ class Recipe(NamedTuple):
     n_workers: int
     """Number of workers."""
     bodies: tuple[str, ...]
-    """Names of the baked bodies that the workers can have."""
+    """Names of the bodies that the workers can have."""
     cameras: tuple[str, ...]
     """Names of the cameras in use."""
     robot: Robot
@@ -97,21 +102,21 @@ class Recipe(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A scene ready for physics: one model that every environment of a batch shares."""
+    """A compiled scene with a model that all environments of a batch share."""
 
     config: SceneConfig
-    """Settings of the scene, with all of its cameras."""
+    """Settings of the scene, including all of its cameras."""
     name: str
     """Name of the scene, a key of `SCENES`."""
     n_workers: int
-    """Number of workers for which the model has room, W."""
+    """Number W of workers in the model."""
     robot: Robot
     """The robot."""
     bodies: tuple[str, ...]
-    """Baked bodies that the workers can have; `model` has the capsules of the first one."""
+    """Bodies that the workers can have; `model` contains the capsules of the first one."""
     model: mujoco.MjModel
-    """Model of the physics: moving, touching and occluding geoms; `drawing_model` has the visual
-    ones, too."""
+    """Model for the physics, with moving, colliding and occluding geoms; `drawing_model` also
+    contains the visual ones."""
     chain: SerialChain
     """Kinematics and capsules of the robot."""
     cameras: tuple[PinholeCamera, ...]
@@ -119,29 +124,30 @@ class Scene:
     home_q: JointAngles
     """(N,) home pose of the robot [rad]."""
     servo_lead_s: Floats
-    """(N,) lead of the rate servos [s]: inertia at the home pose over damping, joint by joint."""
+    """(N,) lead time of the rate servos [s]: each joint's inertia at the home pose divided by the
+    damping."""
     watched_capsules: Ints
-    """Indices of the chain's capsules that workers watch."""
+    """Indices of the robot's capsules that workers watch."""
     worker_mocap: Ints
-    """(W, S) mocap row of every body segment of every worker."""
+    """(W, S) mocap index of every body segment of every worker."""
     worker_capsules: Ints
-    """(W, K) geom of every capsule of every worker."""
+    """(W, K) geom index of every capsule of every worker."""
     obstacles: Floats
-    """(G, `shapes.WIDTH`) fixed shapes that block sight."""
+    """(G, `shapes.WIDTH`) fixed shapes that occlude."""
     grounds: Grounds
     """Floor plan for the workers."""
     map: Grounds
-    """Floor plan that mobile bases know: pedestal and places of loads are blocked, too."""
+    """Floor plan that mobile bases know, in which the pedestal and the loads are also obstacles."""
     objects: Objects
     """Loose objects."""
     grip: Grip | None
-    """The robot's fingers; None for a robot without."""
+    """The robot's fingers; None for a robot without fingers."""
     cups: Cups | None
-    """The robot's suction cups; None for a robot without."""
+    """The robot's suction cups; None for a robot without suction cups."""
     object_bodies: Ints
-    """(O,) the loose objects' bodies in the model."""
+    """(O,) indices of the loose objects' bodies in the model."""
     task_scene: TaskScene
-    """The task's part of the scene, loose and fixed."""
+    """The task's part of the scene, with loose and fixed objects."""
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
@@ -152,8 +158,8 @@ class Scene:
         """Return the shapes that can occlude the view of cameras.
 
         Args:
-            qpos: (B, nq) angles of the robot's N joints [rad], then poses of loose objects.
-            held: objects in the hands of workers; None for none.
+            qpos: (B, nq) angles of the robot's N joints [rad], followed by poses of loose objects.
+            held: objects in the hands of workers; None if there are none.
         """
         chain = self.chain
         moving = np.zeros((len(qpos), 0, WIDTH)) if held is None else held_shapes(held)
@@ -164,7 +170,7 @@ class Scene:
 
     @property
     def recipe(self) -> Recipe:
-        """Arguments from which `build` makes the scene."""
+        """Arguments of `build` from which the scene is made."""
         use = tuple(camera.name for camera in self.cameras)
         return Recipe(
             self.config, self.name, self.n_workers, self.bodies, use, self.robot, self.task_scene
@@ -183,19 +189,19 @@ def build(
     robot: str | Robot = DEFAULT,
     task_scene: TaskScene = NOTHING,
 ) -> Scene:
-    """Return the scene of these settings, compiled once and kept.
+    """Return the compiled scene for these settings, which is cached.
 
     Args:
         config: settings; None for the defaults.
         name: name of the scene, a key of `SCENES`.
-        n_workers: number of workers for which there is room, 0 or more.
-        bodies: the baked body of all workers, or those that they can have; "any" for all bodies.
+        n_workers: number of workers in the scene, at least 0.
+        bodies: body of all workers, or the bodies that they can have; "any" for all bodies.
         cameras: names or indices of the cameras in use; None for all.
         robot: name or record of the robot.
         task_scene: the task's part of the scene.
 
     Raises:
-        ConfigError: an unknown scene, body, camera or robot.
+        ConfigError: the scene, a body, a camera or the robot is unknown.
     """
     check_names("scene", [name], SCENES)
     config = config or SceneConfig()
@@ -215,7 +221,7 @@ def all_grounds(config: SceneConfig | None = None) -> dict[str, Grounds]:
 
 @lru_cache(maxsize=8)
 def _build(recipe: Recipe) -> Scene:
-    """Compile a scene."""
+    """Compile the scene of a recipe."""
     robot, n_workers = recipe.robot, recipe.n_workers
     chain = make_chain(robot, _foot_world(robot, recipe.name))
     spec = _make_spec(recipe)
@@ -256,7 +262,7 @@ def _build(recipe: Recipe) -> Scene:
 
 
 def with_rig(scene: Scene, rig: tuple[CameraConfig, ...]) -> Scene:
-    """Return a scene with other cameras, all of them in use; the physics is shared."""
+    """Return a scene with another rig and all of its cameras in use; the physics is shared."""
     config = replace(scene.config, cameras=rig)
     return replace(scene, config=config, cameras=make_cameras(select(rig)))
 
@@ -270,8 +276,8 @@ def without_workers(scene: Scene) -> Scene:
 def drawing_model(scene: Scene) -> mujoco.MjModel:
     """Return the model of a scene with all visual geoms and with objects that workers can hold.
 
-    The joints and mocap rows of the physics' model come first, in its order, so that its state
-    fits.
+    The joints and mocap bodies of the physics model come first, in the same order; its state is
+    therefore valid for the drawing model.
     """
     prefixes, spec = _prefixes(scene.n_workers), _make_spec(scene.recipe)
     for prefix in prefixes:
@@ -295,7 +301,7 @@ def _make_spec(recipe: Recipe) -> mujoco.MjSpec:
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
-    # The velocity command in force, the body of each worker, and the hand's command or load.
+    # The present velocity command, the body of each worker, and the hand's command or load.
     spec.nuserdata = len(robot.joints) + n_workers + robot.grips
     foot_world = _foot_world(robot, recipe.name)
     add_robot(spec, robot, foot_world)
@@ -308,14 +314,14 @@ def _make_spec(recipe: Recipe) -> mujoco.MjSpec:
 
 
 def _foot_world(robot: Robot, name: str) -> Vector3:
-    """Return the place of a robot's foot in a scene [m]."""
+    """Return the position of a robot's base in a scene [m]."""
     return Vector3(0.0, 0.0, 0.0) if robot.drives else Vector3(*SCENES[name].mount_world)
 
 
 def _remove_visuals(spec: mujoco.MjSpec, drives: bool) -> None:
     """Remove all visual geoms, lights and cameras, which makes the physics twice as fast.
 
-    Geoms that occlude, out of an arm's reach, collide only with robots that drive.
+    Occluding geoms out of the reach of arms collide only with mobile robots.
     """
     hiding = [geom for geom in spec.geoms if geom.group == SOLID and not geom.contype]
     for geom in hiding:
@@ -333,13 +339,13 @@ def _remove_visuals(spec: mujoco.MjSpec, drives: bool) -> None:
 def _add_contact_pairs(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) -> None:
     """Declare the pairs of geoms that can touch the robot or a loose object.
 
-    Explicit pairs are faster than MuJoCo's search in every substep, and leave out fixed geoms
-    beyond the robot's reach.
+    Explicit pairs are faster than MuJoCo's collision search in every substep, and exclude fixed
+    geoms out of the robot's reach.
 
     Args:
-        spec: the scene, whose geoms lose their collision bits.
+        spec: specification of the scene; its geoms lose their collision bits.
         robot: the robot.
-        chain: its kinematics.
+        chain: kinematics of the robot.
     """
     reach = dict(zip(robot.capsules, capsule_reach_m(chain).tolist(), strict=True))
     farthest = max(reach.values())
@@ -370,7 +376,7 @@ def _add_contact_pairs(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) ->
 
 
 def _nearest_m(geom: mujoco.MjsGeom, foot_world: Floats) -> float:
-    """Return a lower bound on the distance of a geom from the robot's foot [m]; 0 if it moves."""
+    """Return a lower bound on the distance of a geom from the robot's base [m]; 0 if it moves."""
     if geom.parent.name != "world":
         return 0.0
     turn = np.zeros(9)
@@ -387,5 +393,5 @@ def _nearest_m(geom: mujoco.MjsGeom, foot_world: Floats) -> float:
 
 
 def _prefixes(n_workers: int) -> tuple[str, ...]:
-    """Return the prefix of the names of each worker's bodies."""
+    """Return the prefixes of the names of each worker's bodies."""
     return tuple(f"worker_{worker + 1}/" for worker in range(n_workers))

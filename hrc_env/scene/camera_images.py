@@ -1,7 +1,8 @@
-"""Small whole images of a rig's cameras, for policies.
+"""Rendering of small, uncropped images of a rig's cameras, for policies.
 
-Static geoms and props on the floor are drawn once for each camera and stored; in every step only
-the moving geoms are drawn over them, by depth. Images have smooth edges and no shadows.
+Static geoms and props on the floor are rendered once for each camera and stored. In every step,
+only the moving geoms are rendered and merged with the stored image by depth. Images are antialiased
+and have no shadows.
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -27,30 +28,31 @@ from hrc_env.scene.render import CROP_QUALITY
 from hrc_env.scene.worker_visuals import HIDDEN, SHOWN, assign_props
 
 SMALLEST_PX = 8
-"""Least height and width of images in an observation [px]."""
+"""Minimum height and width of images in an observation [px]."""
 LARGEST_PX = 1024
-"""Greatest height and width of images in an observation [px]."""
+"""Maximum height and width of images in an observation [px]."""
 SMOOTHING = 2
-"""Factor by which whole images are drawn larger, for smooth edges."""
+"""Supersampling factor of whole images, for antialiasing."""
 SMALL_PX = 128
-"""Height and width up to which round geoms are drawn with the quality `COARSE` [px]."""
+"""Height and width up to which round geoms are rendered with the quality `COARSE` [px]."""
 COARSE = {"numslices": 8, "numstacks": 2}
-"""MuJoCo's visual quality of round geoms in small images."""
+"""MuJoCo's visual quality settings for round geoms in small images."""
 TOO_THIN = 0.2
-"""Thickness of moving discs below which they are not drawn, as a share of a drawn pixel."""
+"""Thickness of moving discs below which they are not rendered, as a fraction of a rendered
+pixel."""
 KEPT_BYTES = 2**28
-"""Memory for stored pictures of static geoms [bytes]."""
+"""Memory for stored images of static geoms [bytes]."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ImageConfig:
-    """Images of cameras in an observation, beside the belief: `observe_images`.
+    """Settings of the camera images that an observation also contains (`observe_images`).
 
-    Each is the present view of a camera of the rig with its lens and the episode's appearance,
-    without faults, delays and shadows. It is the camera's whole image, scaled to `height` x
-    `width`, and black if the camera is not in the episode's rig. A mapping of these fields, or
-    (height, width), stands for it.
+    Each image is the present view of a camera of the rig, with its lens and the episode's
+    appearance, but without faults, delays and shadows. It is the camera's whole image, scaled to
+    `height` x `width`; it is black if the camera is not in the episode's rig. A mapping of these
+    fields or a tuple (height, width) is also accepted.
     """
 
     height: int = 84
@@ -58,7 +60,7 @@ class ImageConfig:
     width: int = 84
     """Width of an image [px], from 8 to 1024."""
     cameras: tuple[int | str, ...] | None = None
-    """Names, or indices from 0, of cameras of the environment's rig; None for all of them."""
+    """Names, or indices from 0, of cameras of the environment's rig; None for all cameras."""
 
     def __post_init__(self) -> None:
         for name in ("height", "width"):
@@ -71,13 +73,13 @@ class ImageConfig:
 
 
 def parse_images(value: Any) -> ImageConfig | None:
-    """Return the settings of images for a value of `observe_images=`.
+    """Return the settings of images for a value of the argument `observe_images`.
 
     Args:
         value: None, (height, width), a mapping or an `ImageConfig`.
 
     Raises:
-        ConfigError: it is none of these, or has an invalid size.
+        ConfigError: the value is none of these, or its size is invalid.
     """
     if value is None or isinstance(value, ImageConfig):
         return value
@@ -101,31 +103,31 @@ def parse_images(value: Any) -> ImageConfig | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Backdrop:
-    """A stored view of the static geoms."""
+    """A stored image of the static geoms."""
 
     look: Look | None
-    """Look with which it was drawn."""
+    """Appearance with which the image was rendered."""
     rgb: Image
-    """Colours as drawn, bottom row first."""
+    """Colours as rendered, bottom row first."""
     z: NDArray[np.float32]
-    """Depths as drawn, from 1 near to 0 far, bottom row first."""
+    """Depths as rendered, from 1 (near) to 0 (far), bottom row first."""
     mean: Image
-    """Colours of the final size, top row first."""
+    """Colours at the final size, top row first."""
 
 
 class Layer(NamedTuple):
-    """A drawn part of the scene."""
+    """A rendered part of the scene."""
 
     rgb: Image
     """Colours, bottom row first."""
     z: NDArray[np.float32]
-    """Depths from 1 near to 0 far, bottom row first."""
+    """Depths from 1 (near) to 0 (far), bottom row first."""
 
 
 class CameraImages(Canvas):
-    """Renderer of whole images of pinhole cameras, (height, width, 3), and square windows of them.
+    """Renderer of whole images (height, width, 3) of pinhole cameras, and square windows of them.
 
-    Environments with the same look share the stored views of static geoms.
+    Environments with the same appearance share the stored images of static geoms.
     """
 
     def __init__(self, scene: Scene, height_px: int, width_px: int, size_px: int = 1) -> None:
@@ -142,7 +144,7 @@ class CameraImages(Canvas):
         coarse = COARSE if max(height_px, width_px) <= SMALL_PX else {}
         super().__init__(scene, width, height, {**CROP_QUALITY, **coarse})
         self.shape, self.size_px = (height_px, width_px), size_px
-        self._owner: int | None = None  # environment with a look of its own
+        self._owner: int | None = None  # environment with a randomized appearance
         self._backdrops: dict[Hashable, _Backdrop] = {}
         self._model.geom_group[self._find_thin()] = HIDDEN
         self._geom_rows = self._model.body_mocapid[self._model.geom_bodyid]
@@ -151,7 +153,7 @@ class CameraImages(Canvas):
         self._without_skins.flags[int(mujoco.mjtVisFlag.mjVIS_SKIN)] = 0
 
     def _find_thin(self) -> Ints:
-        """Return the moving discs that are too thin to be seen in any camera's images."""
+        """Return indices of the moving discs that are too thin to be visible in any image."""
         foot = np.array([*self.scene.grounds.robot_xy_m, 1.0])
         pixels_m = [
             np.linalg.norm(camera.eye_world - foot) / camera.K[0, 0] * camera.width_px / side
@@ -166,7 +168,7 @@ class CameraImages(Canvas):
         return np.flatnonzero(moving & discs & thin & looks)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose the moving geoms, as `Canvas` does; props on the floor count as static."""
+        """Pose the moving geoms like `Canvas`, but treat props on the floor as static."""
         super().pose(q, motion)
         if motion is None or not self._visuals.props.size:
             return
@@ -180,7 +182,7 @@ class CameraImages(Canvas):
         self._model.geom_group[self._lying] = HIDDEN
 
     def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the part of the scene for the next pictures, as `Canvas` does."""
+        """Choose the part of the scene for the next pictures, like `Canvas`, with static props."""
         is_fresh = part in self._fresh
         super().show(part, shadows)
         if part is not MOVING and not is_fresh and len(self._lying):
@@ -198,18 +200,18 @@ class CameraImages(Canvas):
             self._model.geom_group[:] = groups
 
     def dress(self, b: int, look: Look | None) -> None:
-        """Draw environment `b` with its look from the next pose on; None for the scene as built."""
+        """Set the appearance of environment `b` for the next poses; None for the scene as built."""
         self._owner = None if look is None else b
         self.randomize(look)
 
     def image(self, camera: PinholeCamera) -> Image:
-        """Return the whole image of a camera, scaled to (height, width, 3), top row first."""
+        """Render the whole image of a camera, scaled to (height, width, 3), top row first."""
         middle = Roi((camera.width_px / 2, camera.height_px / 2), float(camera.width_px), 0.0)
         fine = SMOOTHING * self.shape[0], SMOOTHING * self.shape[1]
         return self._layered(camera, middle, float(camera.height_px), fine, SMOOTHING)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Return a square window (size, size, 3) of a camera's pinhole image, top row first."""
+        """Render a square window (size, size, 3) of a camera's pinhole image, top row first."""
         return self._layered(camera, window, window.side_px, (self.size_px, self.size_px), 1)
 
     def _layered(
@@ -220,14 +222,14 @@ class CameraImages(Canvas):
         fine: tuple[int, int],
         smoothing: int,
     ) -> Image:
-        """Return an image of the moving geoms in front of the static ones, top row first.
+        """Render the moving geoms in front of the stored static ones, top row first.
 
         Args:
             camera: the camera.
-            window: centre, rotation and width of a rectangle of its image [px].
-            height_px: height of that rectangle [px].
-            fine: height and width with which it is drawn [px].
-            smoothing: side of the squares of drawn pixels that are averaged to one pixel.
+            window: centre, rotation and width of a rectangle of the camera's image [px].
+            height_px: height of the rectangle [px].
+            fine: height and width at which the rectangle is rendered [px].
+            smoothing: side of the squares of rendered pixels that are averaged to one pixel [px].
         """
         numbers = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
         key = (self._owner, self._placement, numbers, window, height_px)
@@ -244,7 +246,7 @@ class CameraImages(Canvas):
         return image
 
     def _remember(self, key: Hashable, behind: _Backdrop) -> None:
-        """Store a view of the static geoms as the latest one; the oldest make room."""
+        """Store an image of the static geoms as the latest, and delete the oldest if needed."""
         self._backdrops.pop(key, None)
         self._backdrops[key] = behind
         most = max(KEPT_BYTES // (behind.rgb.nbytes + behind.z.nbytes), len(self.scene.cameras))
@@ -259,7 +261,7 @@ class CameraImages(Canvas):
         height_px: float,
         shape: tuple[int, int],
     ) -> Layer:
-        """Return a picture of a part of the scene, of this height and width [px]."""
+        """Render a part of the scene with a given height and width [px]."""
         layer = Layer(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32))
         self.show(part)
         self.aim(camera, window, height_px)
@@ -272,12 +274,12 @@ class CameraImages(Canvas):
 
 @kernel
 def _average(rgb: Image, smoothing: int, out: Image) -> None:
-    """Write the means over squares of pixels of a picture.
+    """Average a picture over squares of pixels.
 
     Args:
-        rgb: (smoothing * H, smoothing * W, 3) the picture, bottom row first.
+        rgb: (smoothing * H, smoothing * W, 3) picture, bottom row first.
         smoothing: side of the squares [px].
-        out: (H, W, 3) written, top row first.
+        out: (H, W, 3) output, which is filled, top row first.
     """
     height, width = out.shape[0], out.shape[1]
     count = smoothing * smoothing
@@ -300,15 +302,17 @@ def _lay_smoothly(
     smoothing: int,
     out: Image,
 ) -> None:
-    """Write the means over squares of pixels in which a picture is before the one behind it.
+    """Merge a picture with a background by depth, and average it over squares of pixels.
+
+    Only squares in which a pixel of the picture is nearer than the background are written.
 
     Args:
-        rgb: (smoothing * H, smoothing * W, 3) the picture, bottom row first.
-        z: its depths from 1 near to 0 far, bottom row first.
-        rgb_behind: the picture behind it, of the same shape, bottom row first.
-        z_behind: depths of the picture behind it, bottom row first.
+        rgb: (smoothing * H, smoothing * W, 3) picture, bottom row first.
+        z: depths of the picture from 1 (near) to 0 (far), bottom row first.
+        rgb_behind: background, of the same shape, bottom row first.
+        z_behind: depths of the background, bottom row first.
         smoothing: side of the squares [px].
-        out: (H, W, 3) means of the picture behind it, top row first, which is written.
+        out: (H, W, 3) averaged background, top row first, which is updated.
     """
     height, width = out.shape[0], out.shape[1]
     count = smoothing * smoothing

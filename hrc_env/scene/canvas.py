@@ -1,7 +1,7 @@
-"""An OpenGL context with a scene: pose it, aim it, read the picture.
+"""An OpenGL context for a scene that is posed, viewed by a camera and rendered.
 
-The context is made when the first picture is drawn, and is current only while a picture is drawn:
-threads may take turns, and several canvases never draw into each other.
+The context is made when the first picture is rendered, and is current only during rendering:
+threads may take turns, and several canvases never interfere with each other.
 """
 
 import copy
@@ -38,9 +38,9 @@ from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.worker_visuals import PARKED_M, show_bodies, show_workers
 
 SPHERE_M = 1e-6
-"""Half length of a capsule below which it is drawn as a sphere [m]."""
+"""Half length of a capsule below which it is rendered as a sphere [m]."""
 ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
-"""Groups of geoms that pictures show."""
+"""Groups of geoms that are visible in pictures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ class Part:
     """A part of the scene that a picture shows."""
 
     category: mujoco.mjtCatBit
-    """MuJoCo's category of geoms: all, static or dynamic."""
+    """MuJoCo's category of the shown geoms: all, static or dynamic."""
     sky: bool
-    """Whether the background is the sky; else it is black."""
+    """Whether the background is the sky; otherwise it is black."""
     sunny: bool = True
     """Whether the lights that cast shadows are on."""
 
@@ -62,40 +62,40 @@ STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
 """The moving geoms."""
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
-"""The static geoms without the lights that cast shadows."""
+"""The static geoms, with lights that cast shadows switched off."""
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
-"""The moving geoms without these lights."""
+"""The moving geoms, with lights that cast shadows switched off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:
-    """Capsules that a picture shows and that are no part of the scene; with length 0 spheres."""
+    """Capsules in a picture that are not part of the scene; those of length 0 are spheres."""
 
     ends_world: Capsules
-    """(N, 2, 3) end points of their axes [m]."""
+    """(N, 2, 3) end points of the capsules' axes [m]."""
     radius_m: Floats
-    """(N,) radii [m]."""
+    """(N,) radii of the capsules [m]."""
     rgb: Floats
-    """(N, 3) colours in [0, 1]."""
+    """(N, 3) RGB colours in [0, 1]."""
 
 
 class Spheres(NamedTuple):
     """Spheres in the world."""
 
     centre_world: Points3
-    """(N, 3) middles [m]."""
+    """(N, 3) centres [m]."""
     radius_m: Floats
     """(N,) radii [m]."""
 
 
 class Canvas:
-    """A picture of fixed size.
+    """A renderer of a scene with pictures of a fixed size.
 
     Args:
         scene: the scene.
-        width_px: width of the picture [px].
-        height_px: height of the picture [px].
-        quality: fields of MuJoCo's visual.quality by name.
+        width_px: width of the pictures [px].
+        height_px: height of the pictures [px].
+        quality: values of fields of MuJoCo's visual.quality by name.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class Canvas:
     ) -> None:
         self.scene, self.width_px, self.height_px = scene, width_px, height_px
         self._built = drawing_model(scene)
-        self._model = copy.copy(self._built)  # its own looks and drawing settings
+        self._model = copy.copy(self._built)  # for separate appearance and settings
         for name, value in quality.items():
             setattr(self._model.vis.quality, name, value)
         view = self._model.vis.global_
@@ -120,12 +120,12 @@ class Canvas:
         self._lists: dict[Part, Any] = {}
         self._shown: Any = None
         self._fresh: set[Part] = set()
-        self._kept: dict[Any, Any] = {}  # pictures of static geoms, for subclasses; looks clear it
+        self._kept: dict[Any, Any] = {}  # pictures of static geoms, for subclasses
         self._closed = False
         self.groups(ALL_GROUPS)
 
     def randomize(self, look: Look | None) -> None:
-        """Draw with this look from the next pose on; None for the scene as built."""
+        """Render with an appearance from the next pose on; None for the scene as built."""
         if look is self._look:
             return
         self._look = look
@@ -140,7 +140,8 @@ class Canvas:
         """Pose the robot, the workers and the objects.
 
         Args:
-            q: (N,) joint angles of the robot [rad], or (nq,) with fingers and loose objects.
+            q: (N,) joint angles of the robot [rad], or (nq,) generalized positions of the robot,
+                fingers and loose objects.
             motion: poses of the workers and their props, arrays (W, S, ...); None keeps them.
         """
         if len(q) != self._model.nq:
@@ -156,7 +157,7 @@ class Canvas:
         self._fresh.clear()
 
     def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the part of the scene for the next pictures, in the present pose."""
+        """Choose the part of the scene that the next pictures show, in the present pose."""
         self._open()
         if part not in self._lists:
             self._lists[part] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
@@ -180,7 +181,7 @@ class Canvas:
         flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
 
     def show_marks(self, marks: Marks) -> None:
-        """Choose marks alone for the next pictures, with the lights of the scene."""
+        """Let the next pictures show only marks, with the lights of the scene."""
         self._open()
         self._shown = mujoco.MjvScene(self._model, maxgeom=len(marks.radius_m) + 64)
         category = int(mujoco.mjtCatBit.mjCAT_DECOR)
@@ -203,13 +204,13 @@ class Canvas:
             self._shown.ngeom += 1
 
     def groups(self, groups: Sequence[int]) -> None:
-        """Restrict the next pictures to geoms of these groups."""
+        """Restrict the next pictures to geoms of some groups."""
         self._option.geomgroup[:] = 0
         self._option.geomgroup[list(groups)] = 1
         self._fresh.clear()
 
     def aim(self, camera: PinholeCamera, window: Roi, height_px: float) -> None:
-        """Draw the next pictures from a camera, within a rotated rectangle of its image.
+        """Render the next pictures from a camera, within a rotated rectangle of its image.
 
         Args:
             camera: the camera.
@@ -229,12 +230,12 @@ class Canvas:
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
     def aim_along(self, axes: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
-        """Draw the next pictures by a parallel projection, as a sun shines.
+        """Render the next pictures by a parallel projection, for example along sun rays.
 
         Args:
-            axes: (3, 3) columns right, down and along the rays.
-            middle_world: (3,) middle of the square in the near plane [m].
-            half_m: half side of that square [m].
+            axes: (3, 3) matrix with the directions right, down and along the rays as columns.
+            middle_world: (3,) centre of the square in the near plane [m].
+            half_m: half the side length of the square [m].
             far_m: distance of the far plane from the near plane [m].
         """
         _, down, direction = axes.T
@@ -246,9 +247,9 @@ class Canvas:
             eye.frustum_top, eye.frustum_bottom = half_m, -half_m
 
     def sun_axes(self) -> Floats | None:
-        """Return (3, 3) the columns right, down and along the first light that casts shadows.
+        """Return the axes (3, 3) of the first light that casts shadows; None if there is none.
 
-        None if there is no such light.
+        The columns are the directions right, down and along the light's rays.
         """
         shining = np.flatnonzero(self._model.light_castshadow & self._model.light_active)
         if not len(shining):
@@ -259,7 +260,7 @@ class Canvas:
         return np.stack([right, np.cross(along, right), along], -1)
 
     def find_moving_spheres(self) -> Spheres:
-        """Return bounding spheres of all moving geoms; those of skins are round the capsules."""
+        """Return bounding spheres of moving geoms; those of the capsules cover the skins."""
         model, bodies = self._model, self._model.geom_bodyid
         moving = (model.body_weldid[bodies] != 0) | (model.body_mocapid[bodies] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
@@ -267,11 +268,12 @@ class Canvas:
         return Spheres(self._data.geom_xpos[moving], model.geom_rbound[moving])
 
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
-        """Draw a picture, bottom row first as OpenGL has it.
+        """Render a picture into arrays, bottom row first, which is the order of OpenGL.
 
         Args:
-            rgb: (H, W, 3) written; may be smaller than the canvas, None for no colours.
-            z: (H, W) depths written, from 1 near to 0 far; None for none.
+            rgb: (H, W, 3) output of the colours, which may be smaller than the canvas; None for no
+                colours.
+            z: (H, W) output of the depths, from 1 (near) to 0 (far); None for no depths.
         """
         shapes = [each.shape for each in (rgb, z) if each is not None]
         rect = mujoco.MjrRect(0, 0, shapes[0][1], shapes[0][0])
@@ -280,28 +282,28 @@ class Canvas:
             mujoco.mjr_readPixels(rgb, z, rect, looks)
 
     def paint(self) -> Image:
-        """Return the picture (H, W, 3), top row first."""
+        """Render the picture (H, W, 3), top row first."""
         rgb = np.empty((self.height_px, self.width_px, 3), np.uint8)
         self.read(rgb, None)
         return np.ascontiguousarray(rgb[::-1])
 
     def depth_m(self) -> NDArray[np.float32]:
-        """Return (H, W) the distances along the optical axis [m], top row first.
+        """Render the distances (H, W) along the optical axis [m], top row first.
 
-        Where there is nothing, it is the distance of the far plane.
+        For pixels without a geom, it is the distance of the far plane.
         """
         z = np.empty((self.height_px, self.width_px), np.float32)
         self.read(None, z)
         return self.distance_m(z[::-1])
 
     def distance_m(self, z: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return distances along the optical axis [m] for depths that `read` has written."""
+        """Convert depths from `read` to distances along the optical axis [m]."""
         eye = self._shown.camera[0]
         near, far = float(eye.frustum_near), float(eye.frustum_far)
         return (near * far / (near + z.astype(float) * (far - near))).astype(np.float32)
 
     def close(self) -> None:
-        """Free the context, after which the canvas cannot draw; a second call does nothing."""
+        """Free the context, after which the canvas cannot be used; a second call has no effect."""
         if self._drawing is not None:
             self._drawing.free()
         self._drawing = self._shown = None
@@ -309,19 +311,19 @@ class Canvas:
         self._closed = True
 
     def __del__(self) -> None:
-        try:  # at exit, modules may have gone already
+        try:  # at exit, modules may already be unloaded
             self.close()
         except Exception:
             return
 
     def _take_over_textures(self) -> None:
-        """Copy the materials' textures to the context, which keeps a copy of its own."""
+        """Copy the assignment of textures to materials to the context, which keeps its own copy."""
         if self._drawing is not None:
             textures = self._model.mat_texid.ravel()
             self._drawing.looks.mat_texid[: len(textures)] = textures
 
     def _open(self) -> gl.Drawing:
-        """Return the context, which is made at the first call."""
+        """Return the OpenGL context, which is made at the first call."""
         if self._closed:
             raise RenderingError("This renderer has been closed: make a new one.")
         if self._drawing is None:

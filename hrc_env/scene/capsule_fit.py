@@ -1,8 +1,8 @@
-"""Fit capsules to a shape that is given by points on its surface.
+"""Fitting of capsules to a shape that is given by points on its surface.
 
-A ball protrudes from a shape by its radius minus the depth of its middle. A grid of depths
-therefore gives the greatest radius of a capsule along any line. Of many random lines, the capsule
-that covers most of the remaining surface is chosen, one after the other.
+A sphere protrudes from a shape by its radius minus the depth of its centre. Therefore, a grid of
+depths determines the maximum radius of a capsule along any line. From the capsules along many
+random lines, those that cover most of the remaining surface are chosen one after the other.
 """
 
 from typing import NamedTuple
@@ -14,70 +14,70 @@ from scipy.spatial import KDTree
 from hrc_env.core.typing import Floats, Points3
 
 TRIES = ((0.02, 7), (0.025, 7), (0.025, 14), (0.04, 14), (0.08, 14))
-"""Protrusion of capsules out of the shape [m] and their largest number, in the order of the tries;
-the first that covers enough of the surface is taken."""
+"""Protrusion of capsules from the shape [m] and maximum number of capsules for each attempt, in
+order; the first attempt that covers enough of the surface is used."""
 UNCOVERED_M = 0.005
-"""Distance of the surface out of all capsules below which it is covered [m]."""
+"""Distance of a surface point from the nearest capsule below which it is covered [m]."""
 LEFT_M = 0.015
-"""Largest distance of the surface out of all capsules after a successful try [m]."""
+"""Maximum distance of the surface from the nearest capsule for a successful attempt [m]."""
 LEAST_RADIUS_M = 0.01
-"""Least radius of a capsule [m]."""
+"""Minimum radius of a capsule [m]."""
 CELL_M = 0.01
-"""Spacing of the grid of depths; points on surfaces should have half of it [m]."""
+"""Spacing of the grid of depths [m]; the spacing of points on surfaces should be half of it."""
 WALLS = 5
-"""Number of six directions in which the surface must lie beyond a cell that is inside: a tube with
-open ends has an inside, the corner of an L has none."""
+"""Number of axis directions, out of six, in which a ray from an inner cell must meet the surface.
+With this number, an open-ended tube has inner cells, and the corner of an L has none."""
 LINES = 8000
-"""Number of random lines."""
+"""Number of random lines for capsules."""
 MIDDLES = 1000
-"""Number of points that these lines connect."""
+"""Number of points that the random lines connect."""
 COUNTED = 1000
-"""Number of points by which the covered surface is measured."""
+"""Number of surface points on which the coverage is measured."""
 _TURN = np.pi * (3.0 - 5.0**0.5) * np.arange(120)
 _HEIGHT = (2.0 * np.arange(120) + 1.0) / 120.0 - 1.0
 SHORT = np.array([0.0, 0.0, 1e-3])
-"""Axis of a capsule that is nearly a ball [m]; MuJoCo needs a positive length."""
+"""Axis of a capsule that is nearly a sphere [m]; MuJoCo requires a positive length."""
 SPHERE = np.stack(
     [np.sqrt(1 - _HEIGHT**2) * np.cos(_TURN), np.sqrt(1 - _HEIGHT**2) * np.sin(_TURN), _HEIGHT], -1
 )
-"""(120, 3) directions, evenly on a sphere."""
+"""(120, 3) unit vectors that are evenly distributed on a sphere."""
 
 
 class Rod(NamedTuple):
-    """A capsule in the frame of the points."""
+    """A capsule in the frame of the surface points."""
 
     start_m: Points3
-    """(3,) one end of its axis [m]."""
+    """(3,) first end of the capsule's axis [m]."""
     end_m: Points3
-    """(3,) the other end of its axis [m]."""
+    """(3,) second end of the capsule's axis [m]."""
     radius_m: float
-    """Radius [m]."""
+    """Radius of the capsule [m]."""
 
 
 class _Depths(NamedTuple):
-    """Grid of depths in a shape."""
+    """Grid of depths below the surface of a shape."""
 
     low_m: Points3
-    """(3,) middle of the first cell [m]."""
+    """(3,) centre of the first cell [m]."""
     depth_m: Floats
     """(X, Y, Z) distance of cells from the surface [m]; negative outside."""
 
     def middles(self) -> Points3:
-        """Return (X, Y, Z, 3) the middles of all cells [m]."""
+        """Return the centres (X, Y, Z, 3) of all cells [m]."""
         return np.moveaxis(np.indices(self.depth_m.shape), 0, -1) * CELL_M + self.low_m
 
     def at(self, points_m: Points3) -> Floats:
-        """Return (...) the depths of points (..., 3) [m]."""
+        """Return the depths (...) of points (..., 3) [m]."""
         cells = ((points_m - self.low_m) / CELL_M).reshape(-1, 3).T
         depths = map_coordinates(self.depth_m, cells, order=1, mode="nearest")
         return np.asarray(depths, np.float64).reshape(points_m.shape[:-1])
 
 
 def fit_rods(points_m: Points3) -> list[Rod]:
-    """Return few capsules that cover points on the surface of a shape.
+    """Fit a small number of capsules that cover points on the surface of a shape.
 
     Args:
-        points_m: (N, 3) points [m], neighbours not farther apart than half of `CELL_M`.
+        points_m: (N, 3) points with a spacing of at most half of `CELL_M` [m].
     """
     rng = np.random.default_rng(0)
     depths = _measure_depths(points_m)
@@ -96,7 +96,7 @@ def fit_rods(points_m: Points3) -> list[Rod]:
 
 
 def _measure_depths(points_m: Points3) -> _Depths:
-    """Return the grid of depths of a shape, given points (N, 3) on its surface [m]."""
+    """Compute the grid of depths of a shape, given points (N, 3) on its surface [m]."""
     margin_m = max(out_m for out_m, _ in TRIES)
     low_m = points_m.min(0) - margin_m
     counts = np.ceil((points_m.max(0) + margin_m - low_m) / CELL_M).astype(int) + 1
@@ -112,7 +112,7 @@ def _measure_depths(points_m: Points3) -> _Depths:
 
 
 def _draw_lines(depths: _Depths, out_m: float, rng: np.random.Generator) -> list[Rod]:
-    """Return the thickest capsules along random lines that protrude from the shape by `out_m`."""
+    """Return the thickest capsules along random lines that protrude by `out_m` [m]."""
     middles = depths.middles()[depths.depth_m + out_m > LEAST_RADIUS_M]
     middles = middles[rng.permutation(len(middles))[:MIDDLES]]
     start, end = middles[rng.integers(len(middles), size=(2, LINES))]
@@ -124,7 +124,7 @@ def _draw_lines(depths: _Depths, out_m: float, rng: np.random.Generator) -> list
 
 
 def _cover(points_m: Points3, lines: list[Rod], most: int) -> list[Rod]:
-    """Return at most `most` capsules, each the one that covers most of the remaining points."""
+    """Choose up to `most` capsules, each of which covers most of the remaining points."""
     covers = np.stack([outside_m(points_m, line) <= UNCOVERED_M for line in lines])
     left, rods = np.ones(len(points_m), np.bool_), list[Rod]()
     while left.any() and len(rods) < most:
@@ -135,7 +135,7 @@ def _cover(points_m: Points3, lines: list[Rod], most: int) -> list[Rod]:
 
 
 def _shrink(points_m: Points3, rods: list[Rod]) -> list[Rod]:
-    """Return the capsules with the least radii that still cover all points (N, 3)."""
+    """Reduce the radii of capsules as far as they still cover all points (N, 3)."""
     rods = list(rods)
     for k, rod in enumerate(rods):
         uncovered = points_m[_outside_all_m(points_m, rods[:k] + rods[k + 1 :]) > UNCOVERED_M]
@@ -146,13 +146,13 @@ def _shrink(points_m: Points3, rods: list[Rod]) -> list[Rod]:
 
 
 def _outside_all_m(points_m: Points3, rods: list[Rod]) -> Floats:
-    """Return (N,) the distance of points (N, 3) out of the nearest capsule [m]."""
+    """Return the distance (N,) of points (N, 3) from the surface of the nearest capsule [m]."""
     away_m = [outside_m(points_m, rod) for rod in rods]
     return np.asarray(np.min([np.full(len(points_m), np.inf), *away_m], axis=0))
 
 
 def sample_rod(rod: Rod) -> Points3:
-    """Return points (N, 3) on the surface of a capsule [m]."""
+    """Sample points (N, 3) on the surface of a capsule [m]."""
     along = rod.end_m - rod.start_m
     length = float(np.linalg.norm(along))
     axis = along / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -167,7 +167,10 @@ def sample_rod(rod: Rod) -> Points3:
 
 
 def outside_m(points_m: Points3, rod: Rod) -> Floats:
-    """Return (N,) the distance of points (N, 3) out of a capsule [m]; negative inside."""
+    """Return the signed distance (N,) of points (N, 3) from a capsule's surface [m].
+
+    It is negative inside the capsule.
+    """
     along = rod.end_m - rod.start_m
     share = (points_m - rod.start_m) @ along / max(float(along @ along), 1e-12)
     nearest = rod.start_m + np.clip(share, 0.0, 1.0)[:, None] * along

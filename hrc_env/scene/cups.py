@@ -1,4 +1,4 @@
-"""Suction cups: an object sticks to them from contact until they are vented or it is torn off."""
+"""Suction cups, which hold an object from contact until they are vented or it is torn off."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from hrc_env.scene.robot import Robot
 
 CUPS = "cups_"
-"""Prefix of the name of a weld between cups and an object; the object's name follows."""
+"""Prefix of the name of a weld between cups and an object, followed by the object's name."""
 SEAL_M = 0.004
-"""Distance of the cups from their place on a face below which they seal [m]."""
+"""Distance of the cups from their target on an object's face below which they seal [m]."""
 SEAL_RAD = 0.03
-"""Angle between cups and face below which they seal [rad]."""
+"""Angle between the cups and an object's face below which they seal [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,15 +30,15 @@ class Cups:
     welds: Ints
     """(C,) index of the equality constraint that holds each object."""
     T_object_from_site: Transforms
-    """(C, 4, 4) place of the cups on each object."""
+    """(C, 4, 4) target pose of the cups on each object."""
     gauge: int
-    """First of three entries of `sensordata` with the force on the cups [N]."""
+    """Index of the first of three entries of `sensordata` with the force on the cups [N]."""
     limit_n: float
     """Load above which an object is torn off [N]."""
 
 
 def find_cups(robot: "Robot", model: mujoco.MjModel, objects: Objects, prefix: str) -> Cups | None:
-    """Return a robot's cups in a compiled scene; None if it has none.
+    """Find the suction cups of a robot in a compiled scene; None if it has none.
 
     Args:
         robot: the robot.
@@ -70,10 +70,10 @@ def find_cups(robot: "Robot", model: mujoco.MjModel, objects: Objects, prefix: s
 
 
 def find_sealed(cups: Cups, T_world_from_tool: Transforms, poses: Floats) -> Bools:
-    """Return (B, C) whether the cups sit on each object so that they seal.
+    """Return a mask (B, C) of the objects on which the cups seal.
 
     Args:
-        cups: the arm's cups.
+        cups: suction cups of the arm.
         T_world_from_tool: (B, 4, 4) poses of the cups.
         poses: (B, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
     """
@@ -88,10 +88,10 @@ def find_sealed(cups: Cups, T_world_from_tool: Transforms, poses: Floats) -> Boo
 
 
 def measure_load_n(cups: Cups, sensordata: Floats) -> Floats:
-    """Return (...) the force that pulls at the cups [N], from sensordata (..., n).
+    """Return the load (...) on the cups [N], from sensordata (..., n).
 
-    It is the pull along the cups' axis and the shear across it; a push counts 0 along the axis. The
-    weight of the cups is part of it.
+    It is the magnitude of the tensile force along the cups' axis and the shear across it;
+    compression along the axis counts as 0. It includes the weight of the cups.
     """
     x, y, z = np.moveaxis(sensordata[..., cups.gauge : cups.gauge + 3], -1, 0)
     return np.sqrt(x * x + y * y + np.square(np.minimum(z, 0.0)))

@@ -1,7 +1,7 @@
-"""Visual domain randomization, drawn for every episode: light, colours, hats and litter.
+"""Visual domain randomization of light, colours, hats and litter, drawn for every episode.
 
-It changes images and nothing else: places, occlusion, the workers' motion, goals and faults are
-those of the same seed without it. It is drawn from a random stream of its own.
+It changes only images: positions, occlusion, the workers' motion, goals and faults are the same as
+without it for the same seed, because it is drawn from a separate random stream.
 """
 
 from collections.abc import Mapping
@@ -20,17 +20,18 @@ from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
 from hrc_env.world import Grounds
 
 LEAST_FALL = 0.4
-"""Least downward component of the light's direction, a unit vector."""
+"""Minimum downward component of the light's direction, a unit vector."""
 PLAIN_RGB = (0.78, 0.76, 0.72)
 """Colour of a surface without its texture, before it is tinted."""
 LITTER_M = (0.06, 0.35)
-"""Range of the half sides of litter [m]."""
+"""Range of the half side lengths of litter [m]."""
 LITTER_THICK_M = 0.002
 """Half thickness of litter [m]."""
 CLOTH = "cloth"
-"""Suffix of the names of skins that are clothes."""
+"""Suffix of the names of skins that represent clothes."""
 STREAM = 0x10075
-"""Key of the random stream for looks; those of a generator's `spawn` count from 0."""
+"""Key of the random stream for appearances, distinct from those of `Generator.spawn`, which count
+from 0."""
 
 
 @answer_unknown_fields
@@ -42,25 +43,27 @@ class AppearanceConfig:
     """Present names of fields that were renamed, by their old names."""
 
     light: tuple[float, float] = (1.0, 1.0)
-    """Least and greatest factor on the strength of all light."""
+    """Minimum and maximum of the factor on the brightness of all light."""
     light_turn_deg: float = 0.0
     """Largest rotation of the directions of lamps and sun about the vertical [deg]."""
     light_tilt_deg: float = 0.0
     """Largest tilt of the directions of lamps and sun [deg]."""
     warmth: float = 0.0
-    """Largest share by which light is redder and less blue, or less red and bluer."""
+    """Largest fraction by which light is redder and less blue, or less red and bluer."""
     untextured: float = 0.0
-    """Share of the scene's surfaces that lose their texture (wood, concrete, plaster)."""
+    """Fraction of the scene's textured surfaces that lose their texture (wood, concrete,
+    plaster)."""
     tint: float = 0.0
-    """Largest share by which each colour channel of each surface of the scene is darker."""
+    """Largest fraction by which each colour channel of each surface in the scene is darkened."""
     clothing: float = 0.0
-    """Largest share by which each colour channel of each worker's clothes is darker."""
+    """Largest fraction by which each colour channel of each worker's clothes is darkened."""
     skin: float = 0.0
-    """Largest share by which the workers' skins are darker."""
+    """Largest fraction by which the workers' skins are darkened."""
     hat: float = 1.0
     """Probability that a worker with a hat wears it."""
     litter: int = 0
-    """Largest number of flat objects of any colour on the floor, too thin to occlude anything."""
+    """Maximum number of flat objects of any colour on the floor, which are too thin to occlude
+    anything."""
 
     def __post_init__(self) -> None:
         low, high = self.light
@@ -79,7 +82,7 @@ class AppearanceConfig:
 MOST_LITTER = 60
 """Upper limit of `AppearanceConfig.litter`."""
 AS_BUILT = AppearanceConfig()
-"""No randomization."""
+"""Appearance without randomization."""
 VARIED = AppearanceConfig(
     light=(0.5, 1.3),
     light_turn_deg=180.0,
@@ -92,7 +95,7 @@ VARIED = AppearanceConfig(
     hat=0.6,
     litter=25,
 )
-"""Randomization of everything, by ranges that were judged to be plausible."""
+"""Randomization of all properties, within ranges that were judged to be plausible."""
 APPEARANCES: dict[str, AppearanceConfig] = {
     "as_built": AS_BUILT,
     "varied": VARIED,
@@ -102,32 +105,32 @@ APPEARANCES: dict[str, AppearanceConfig] = {
     "surfaces": AppearanceConfig(untextured=0.5, tint=0.7, litter=40),
     "people": AppearanceConfig(clothing=0.8, skin=0.6, hat=0.5),
 }
-"""Randomizations by name: none, all, and of one kind at a time."""
+"""Named appearances: without randomization, with all of it, and with one kind at a time."""
 
 
 class Look(NamedTuple):
-    """The drawn appearance of one episode."""
+    """The appearance drawn for one episode."""
 
     light: float
-    """Factor on all light."""
+    """Factor on the brightness of all light."""
     turn_rad: float
     """Rotation of the light's directions about the vertical [rad]."""
     tilt_rad: float
     """Tilt of the light's directions about the horizontal direction `tilt_about_rad` [rad]."""
     tilt_about_rad: float
-    """Angle of the axis of the tilt, from world +x [rad]."""
+    """Angle of the tilt's axis from world +x [rad]."""
     light_rgb: Floats
-    """(3,) colour of the light."""
+    """(3,) RGB factors on the colour of the light."""
     clothing_rgb: Floats
-    """(W, 3) factors on the colours of clothes."""
+    """(W, 3) RGB factors on the colours of clothes."""
     skin_rgb: Floats
-    """(W, 3) factors on the colours of skins."""
+    """(W, 3) RGB factors on the colours of skins."""
     has_hat: Floats
-    """(W,) 1 for a worker with a hat on, else 0."""
+    """(W,) 1 for a worker that wears a hat, and 0 for others."""
     untextured: float
-    """Share of surfaces without their textures."""
+    """Fraction of textured surfaces that lose their texture."""
     tint: float
-    """Largest share by which the colour channels of surfaces are darker."""
+    """Largest fraction by which the colour channels of surfaces are darkened."""
     n_litter: int
     """Number of flat objects on the floor."""
     seed: int
@@ -138,9 +141,9 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
     """Draw the appearance of an episode.
 
     Args:
-        config: ranges of the draws.
-        n_workers: number of workers for which the scene has room.
-        rng: the environment's sensor generator, whose state is not changed.
+        config: ranges of the randomization.
+        n_workers: number of workers in the scene.
+        rng: random generator of the environment's sensors; its state is not changed.
     """
     own = aside(rng, STREAM)
     low, high = config.light
@@ -164,13 +167,13 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
 def randomize(
     model: mujoco.MjModel, built: mujoco.MjModel, visuals: WorkerVisuals, look: Look
 ) -> None:
-    """Apply a look to a drawing model.
+    """Apply an appearance to a drawing model.
 
     Args:
-        model: a drawing model of the caller's own, which is changed.
+        model: drawing model of the caller, which is changed.
         built: the original model.
         visuals: indices of the workers' skins.
-        look: the look.
+        look: the appearance.
     """
     _randomize_light(model, built, look)
     _randomize_surfaces(model, built, look)
@@ -181,7 +184,7 @@ def randomize(
 
 
 def restore(model: mujoco.MjModel, built: mujoco.MjModel) -> None:
-    """Restore the appearance of the original model in a drawing model of the caller's own."""
+    """Restore the original model's appearance in a drawing model of the caller."""
     fields = "light_dir", "light_diffuse", "light_specular", "mat_rgba", "mat_texid", "skin_rgba"
     for name in fields:
         getattr(model, name)[:] = getattr(built, name)
@@ -190,13 +193,13 @@ def restore(model: mujoco.MjModel, built: mujoco.MjModel) -> None:
 
 
 def hide_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
-    """Hide the hats of workers that wear none in this episode; call it after `show_bodies`."""
+    """Hide the hats of workers without a hat in this episode; call it after `show_bodies`."""
     bare = visuals.hats[look.has_hat[visuals.hats[:, 0]] == 0.0, 2]
     model.geom_group[bare] = HIDDEN
 
 
 def add_litter(scene: mujoco.MjvScene, grounds: Grounds, look: Look) -> None:
-    """Add the objects on the floor to MuJoCo's list of drawn geoms."""
+    """Add litter on the floor to MuJoCo's list of rendered geoms."""
     draws = np.random.default_rng(look.seed)
     low, high = np.array([grounds.walkable_x_m, grounds.walkable_y_m]).T
     for k in range(min(look.n_litter, scene.maxgeom - scene.ngeom)):
@@ -214,7 +217,7 @@ def add_litter(scene: mujoco.MjvScene, grounds: Grounds, look: Look) -> None:
 
 
 def _randomize_light(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -> None:
-    """Set strength, colour and direction of all light."""
+    """Set brightness, colour and direction of all light."""
     factor = look.light * look.light_rgb
     axis = np.array([np.cos(look.tilt_about_rad), np.sin(look.tilt_about_rad), 0.0])
     towards = built.light_dir @ about_axis("z", look.turn_rad).T

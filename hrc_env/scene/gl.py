@@ -1,9 +1,9 @@
-"""The only access to OpenGL: its backends, its contexts, and the errors without it.
+"""Access to OpenGL: selection of a backend, contexts, and errors if it is unavailable.
 
-mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL if
-its library is installed (no display is needed), else through OSMesa, else in a hidden window.
-
-A context is current on a thread only while that thread draws: any thread may draw or close next.
+mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux renders by EGL if its
+library is installed (no display is needed), otherwise by OSMesa, or else in a hidden window. A
+context is current on a thread only while that thread renders; therefore any thread may render next
+or close the context.
 """
 
 import atexit
@@ -28,39 +28,39 @@ if TYPE_CHECKING:
     import mujoco
 
 APT_LINE = "sudo apt-get install -y libegl1 libgl1 libglx-mesa0 libegl-mesa0"
-"""Command that installs a software OpenGL on Debian or Ubuntu."""
+"""Command that installs a software implementation of OpenGL on Debian or Ubuntu."""
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
-"""Shared library of a backend that needs no window system, best first."""
+"""Shared libraries of the backends that need no window system, in order of preference."""
 WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
-"""Values of MUJOCO_GL with which mujoco on Linux draws in a hidden window."""
+"""Values of MUJOCO_GL with which mujoco renders in a hidden window on Linux."""
 OFF = ("disable", "disabled", "off", "false", "0")
-"""Values of MUJOCO_GL that switch rendering off."""
+"""Values of MUJOCO_GL that disable rendering."""
 VARIABLES = ("PYOPENGL_PLATFORM", "MUJOCO_EGL_DEVICE_ID", "CUDA_VISIBLE_DEVICES", "EGL_PLATFORM")
-"""Further variables on which it depends whether a context can be made."""
+"""Further environment variables that affect whether a context can be made."""
 EXIT_PATIENCE_S = 2.0
-"""Longest time for which another thread's picture keeps the process from ending [s]."""
+"""Maximum time for which the end of the process waits for another thread's rendering [s]."""
 _MAKING = threading.Lock()
-"""Lock of the threads that make contexts."""
+"""Lock that lets only one thread at a time make a context."""
 _OPEN: weakref.WeakSet["Drawing"] = weakref.WeakSet()
 """Contexts that have not been freed."""
 
 
 class Drawing:
-    """A GL context with a model's textures and meshes, for any thread, one at a time."""
+    """An OpenGL context with a model's textures and meshes, which one thread at a time may use."""
 
     def __init__(self, context: Any, looks: "mujoco.MjrContext") -> None:
-        """Hold a context.
+        """Wrap a context.
 
         Args:
-            context: a context of one of mujoco's classes.
-            looks: textures and meshes that were made in it.
+            context: context of one of mujoco's classes.
+            looks: textures and meshes that were made in the context.
         """
         self._gl, self.looks = context, looks
         self._lock, self._freed = threading.RLock(), False
 
     @contextlib.contextmanager
     def current(self) -> Iterator["mujoco.MjrContext"]:
-        """Make the context current on this thread; afterwards the previous one is current again."""
+        """Make the context current on this thread; restore the previous one afterwards."""
         with self._lock:
             if self._freed:
                 raise RenderingError("This graphics context has been freed: make a new renderer.")
@@ -72,7 +72,7 @@ class Drawing:
                 restore()
 
     def free(self) -> None:
-        """Free the context, after which it cannot draw; a second call does nothing."""
+        """Free the context, after which it cannot be used; a second call has no effect."""
         with self._lock:
             if not self._freed:
                 with self.current():
@@ -81,13 +81,13 @@ class Drawing:
                 self._freed = True
 
     def free_at_exit(self) -> None:
-        """Free the context and keep its lock, so that no other thread draws with it."""
+        """Free the context and keep its lock, so that no other thread can use it."""
         if self._lock.acquire(timeout=EXIT_PATIENCE_S):
             self.free()
 
 
 def import_mujoco() -> None:
-    """Import mujoco even if the backend of MUJOCO_GL cannot be loaded, as only pictures need it."""
+    """Import mujoco even if the backend of MUJOCO_GL, needed only to render, cannot be loaded."""
     chosen = choose_backend()
     try:
         importlib.import_module("mujoco")
@@ -112,9 +112,9 @@ def choose_backend() -> str:
 
 
 def draw_on_one_thread() -> None:
-    """Let Mesa's software OpenGL draw in the calling thread, unless LP_NUM_THREADS is set.
+    """Let Mesa's software OpenGL render in the calling thread, unless LP_NUM_THREADS is set.
 
-    Its own threads, one a core, would compete with the thread of the detector.
+    Mesa's rendering threads, one per core, would compete with the thread of the detector.
     """
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
@@ -123,12 +123,12 @@ def draw_on_one_thread() -> None:
 def load_triton_first() -> None:
     """Load the library of triton, if it is installed, before Mesa's first context or window.
 
-    If it is loaded later, as `torch.optim` does, it uses Mesa's LLVM instead of its own and
-    crashes.
+    If the library is loaded later, for example by `torch.optim`, it uses Mesa's LLVM instead of its
+    own and crashes.
     """
-    with contextlib.suppress(OSError, ValueError):  # without triton nothing can go wrong
+    with contextlib.suppress(OSError, ValueError):  # without triton there is no problem
         triton = importlib.util.find_spec("triton")
-        late = "libLLVM" in Path("/proc/self/maps").read_text()  # a picture was drawn already
+        late = "libLLVM" in Path("/proc/self/maps").read_text()  # a picture was rendered before
         mode = ctypes.DEFAULT_MODE | (os.RTLD_DEEPBIND if late else 0)
         for folder in (triton and triton.submodule_search_locations) or ():
             for library in (Path(folder) / "_C").glob("libtriton*.so"):
@@ -136,7 +136,7 @@ def load_triton_first() -> None:
 
 
 def require_display() -> None:
-    """Raise `RenderingError` unless a window system answers."""
+    """Raise `RenderingError` if no window system is available."""
     import glfw
 
     if not glfw.init():
@@ -150,13 +150,13 @@ class GlStatus(NamedTuple):
     """State of OpenGL on this machine."""
 
     works: bool
-    """Whether a pixel can be drawn."""
+    """Whether pixels can be rendered."""
     message: str
-    """Sentence with the backend, or with the error and its remedy."""
+    """Sentence about the backend, or about the error and its remedy."""
 
 
 def gl_status() -> GlStatus:
-    """Draw a picture, and return whether OpenGL works."""
+    """Render a test picture, and return the state of OpenGL."""
     import mujoco
 
     try:
@@ -177,12 +177,12 @@ def gl_status() -> GlStatus:
 
 
 def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawing:
-    """Return a GL context of the chosen backend, which is not current on any thread.
+    """Make an OpenGL context of the chosen backend, which is not current on any thread.
 
     Args:
-        width_px: width of its pictures [px].
-        height_px: height of its pictures [px].
-        model: the drawing model, whose textures and meshes it holds.
+        width_px: width of the context's pictures [px].
+        height_px: height of the context's pictures [px].
+        model: drawing model with the textures and meshes for the context.
 
     Raises:
         RenderingError: no context could be made; the error names the remedy.
@@ -194,7 +194,7 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
         raise RenderingError(f"Rendering is switched off by MUJOCO_GL={backend!r}: unset it.")
     load_triton_first()
     try:
-        with _MAKING:  # libraries are loaded, and displays opened, by one thread
+        with _MAKING:  # one thread at a time loads libraries and opens displays
             kind = _context_class(backend)
             restore = _find_restore(kind)
             try:
@@ -206,7 +206,7 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
                 restore()
             if not _OPEN:
                 atexit.unregister(_free_all)
-                atexit.register(_free_all)  # after mujoco, so that this runs before its function
+                atexit.register(_free_all)  # registered after mujoco's function, to run before it
             _OPEN.add(made)
             return made
     except Exception as error:
@@ -218,25 +218,25 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
 
 
 def _settings(backend: str) -> str:
-    """Return the variables on which drawing depends, with their values."""
+    """Return a description of the environment variables that affect rendering."""
     others = [f"{name}={os.environ[name]!r}" for name in VARIABLES if name in os.environ]
     return ", ".join([f"MUJOCO_GL={backend or 'not set'!r}", *others])
 
 
 def _free_all() -> None:
-    """Free open contexts before their libraries are unloaded, for a silent exit."""
+    """Free all contexts before their libraries are unloaded, to avoid errors at exit."""
     for drawing in list(_OPEN):
         with contextlib.suppress(Exception):
             drawing.free_at_exit()
 
 
 def _find_restore(context_class: type) -> Callable[[], Any]:
-    """Return a function that makes this thread's present context current again."""
+    """Return a function that restores the context that is now current on this thread."""
     kind = context_class.__module__
     if kind == "mujoco.egl":
         egl = sys.modules[kind]
         library, nothing = egl.EGL, (egl.EGL.EGL_NO_SURFACE,) * 2
-        library.eglBindAPI(library.EGL_OPENGL_API)  # a new thread has none
+        library.eglBindAPI(library.EGL_OPENGL_API)  # a new thread has no API bound
         before = library.eglGetCurrentContext()
         if not before:
             none = library.EGL_NO_CONTEXT
@@ -258,7 +258,7 @@ def _find_restore(context_class: type) -> Callable[[], Any]:
 
 
 def _context_class(backend: str) -> Any:
-    """Return the backend's class; mujoco.GLContext is fixed at mujoco's first import."""
+    """Return the context class of a backend, which may differ from that at mujoco's import."""
     if not sys.platform.startswith("linux"):
         return importlib.import_module("mujoco").GLContext
     if backend in WINDOWS:
@@ -281,12 +281,11 @@ def _renderer() -> str:
 
         name: Any = glGetString(GL_RENDERER)
         return name.decode()
-    except Exception as error:  # a name to print, no reason to fail
+    except Exception as error:  # the name is only printed
         return f"renderer without a name: {error}"
 
 
 def _has_library(name: str) -> bool:
-    """Return whether a shared library can be loaded."""
     """Return whether a shared library can be loaded."""
     if ctypes.util.find_library(name):
         return True

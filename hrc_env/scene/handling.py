@@ -1,6 +1,6 @@
-"""The task's loose objects: their state, their measurement, and the load of the robot.
+"""State and measurement of the task's loose objects, and the loads that robots carry.
 
-Objects are not tracked by cameras: the robot knows their true poses plus noise.
+Objects are not tracked by cameras; the robot measures their true poses with noise.
 """
 
 from dataclasses import dataclass, replace
@@ -22,19 +22,21 @@ class ObjectsConfig:
     """Noise of the robot's measurement of the task's loose objects."""
 
     noise_m: float = 0.001
-    """Standard deviation of each coordinate of an object's position, drawn in every step [m]."""
+    """Standard deviation of the noise on each coordinate of an object's position in every step
+    [m]."""
     noise_rad: float = 0.005
-    """Standard deviation of an object's rotation about each axis, drawn in every step [rad]."""
+    """Standard deviation of the noise on an object's rotation about each axis in every step
+    [rad]."""
 
     def __post_init__(self) -> None:
         check_fields(self, "not be negative", "noise_m", "noise_rad")
 
 
 class LoadedRobot(NamedTuple):
-    """Robots with the objects that they carry as part of them."""
+    """Robots, including the objects that they carry."""
 
     world: World
-    """The world, in which the robot has the carried objects' capsules."""
+    """The world, in which the capsules of carried objects belong to the robot."""
     path_world: Capsules
     """(B, T, K, 2, 3) capsules of robot and carried objects after every substep [m]."""
 
@@ -54,11 +56,11 @@ def make_world(physics: Physics, ids: Ints, robot: RobotState) -> World:
 def attach_load(
     scene: Scene, world: World, path_world: Capsules, q_path: Floats, is_load: Bools | bool = True
 ) -> LoadedRobot:
-    """Return the robots with the objects that they carry as part of them.
+    """Return the robots, with the objects that they carry as parts of the robots.
 
     Args:
         scene: the scene.
-        world: robots and objects, B of them.
+        world: state of the B robots and their objects.
         path_world: (B, T, K, 2, 3) capsules of the robots after every substep [m].
         q_path: (B, T, nq) `qpos` after every substep.
         is_load: (B, O) whether each object counts as part of the robot while it is held.
@@ -75,7 +77,7 @@ def measure_objects(objects: ObjectState, rngs: Rngs, config: ObjectsConfig) -> 
 
     Args:
         objects: (B, O) true states.
-        rngs: B generators.
+        rngs: B random generators.
         config: standard deviations of the noise.
     """
     shape = objects.position_world.shape[1:]
@@ -89,7 +91,7 @@ def measure_objects(objects: ObjectState, rngs: Rngs, config: ObjectsConfig) -> 
 
 
 def _rotate(quaternion: QuaternionsWxyz, half_turn: Floats) -> QuaternionsWxyz:
-    """Return quaternions (..., 4) after small rotations by twice (..., 3) [rad] in the world."""
+    """Rotate quaternions (..., 4) in the world by small vectors 2 `half_turn` (..., 3) [rad]."""
     w, v = quaternion[..., :1], quaternion[..., 1:]
     dot = (half_turn * v).sum(-1, keepdims=True)
     rotated = np.concatenate([w - dot, v + w * half_turn + np.cross(half_turn, v)], axis=-1)

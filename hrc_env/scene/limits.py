@@ -1,4 +1,4 @@
-"""Limits of a scene's robot: its commands, its mass in a contact, and the objects to reach."""
+"""Properties of a scene's robot: limits of commands, effective mass, and objects to reach."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from hrc_env.scene.robot import PREFIX
 
 
 def slew_rad_s2(scene: Scene) -> Floats:
-    """Return (N,) the limit on the change of each joint's commanded velocity.
+    """Return the limits (N,) on the rate of change of the joints' commanded velocities.
 
-    It is in rad/s^2, of a slide in m/s^2.
+    The unit is rad/s^2, or m/s^2 for a slide.
     """
     slew = scene.robot.slew or scene.config.slew_rad_s2
     return np.array(np.broadcast_to(slew, scene.chain.n_joints), float)
@@ -21,7 +21,8 @@ def slew_rad_s2(scene: Scene) -> Floats:
 def effective_mass_kg(scene: Scene) -> float:
     """Return the effective mass of the robot in a contact without a load [kg].
 
-    It is half the mass of an arm's moving parts (ISO/TS 15066, A.3), and all of a mobile base's.
+    It is half the mass of an arm's moving parts (ISO/TS 15066, A.3), or the total mass of a mobile
+    base's moving parts.
     """
     model = scene.model
     is_robot = [model.body(b).name.startswith(PREFIX) for b in range(model.nbody)]
@@ -30,23 +31,23 @@ def effective_mass_kg(scene: Scene) -> float:
 
 
 def load_kg(scene: Scene) -> Floats:
-    """Return (O,) the masses of the task's loose objects [kg]."""
+    """Return the masses (O,) of the task's loose objects [kg]."""
     return scene.model.body_mass[scene.object_bodies].copy()
 
 
 def robot_model(scene: Scene, fastest_rad_s: Floats) -> RobotModel:
-    """Return the constants of a scene's robot.
+    """Return the constant properties of a scene's robot.
 
     Args:
         scene: the scene with the robot.
-        fastest_rad_s: (N,) the greatest velocity of each joint that an action commands [rad/s].
+        fastest_rad_s: (N,) maximum velocity of each joint that an action can command [rad/s].
     """
     slew, mass_kg, loads_kg = slew_rad_s2(scene), effective_mass_kg(scene), load_kg(scene)
     return RobotModel(scene.chain, fastest_rad_s, slew, mass_kg, loads_kg)
 
 
 def object_targets(scene: Scene) -> list[ReachTarget]:
-    """Return the places of loose objects at the start, which the robot's tool has to reach."""
+    """Return the initial positions of loose objects as targets that the tool has to reach."""
     loose, size_m = scene.objects, np.linalg.norm(scene.objects.half_size_m, axis=1)
     places = zip(loose.names, scene.model.body_pos[scene.object_bodies], size_m, strict=True)
     return [ReachTarget(f"object {name!r}", at, within_m=size) for name, at, size in places]

@@ -1,6 +1,6 @@
-"""A task's loose objects: bodies of boxes with a free joint in the task's MJCF.
+"""A task's loose objects, which are bodies of boxes with a free joint in the task's MJCF.
 
-Their free joints follow the robot's joints in `qpos`, seven numbers each: position [m] and
+In `qpos`, their free joints follow the robot's joints, with seven numbers each: position [m] and
 quaternion (w, x, y, z).
 """
 
@@ -25,41 +25,41 @@ from hrc_env.world import TaskScene
 PREFIX = "task/"
 """Prefix of the names of a task's parts in a scene."""
 POSE = 7
-"""Numbers of an object's pose in `qpos`."""
+"""Number of entries of an object's pose in `qpos`."""
 RATE = 6
-"""Numbers of an object's velocity in `qvel`."""
+"""Number of entries of an object's velocity in `qvel`."""
 PITCH_M = 0.10
-"""Greatest distance of neighbouring capsules of a carried box [m]."""
+"""Maximum distance between neighbouring capsules of a carried box [m]."""
 THINNEST_M = 0.019
-"""Least radius of such a capsule [m]."""
+"""Minimum radius of a capsule of a carried box [m]."""
 AWAY_M = 1e4
-"""Coordinate at which capsules of objects are placed that are not carried [m]."""
+"""Coordinate at which the capsules of objects that are not carried are placed [m]."""
 GRIP_M = 0.01
-"""Greatest distance of the tool point from an object that closed fingers hold [m]."""
+"""Maximum distance of the tool point from an object that closed fingers hold [m]."""
 
 
 def add_task_scene(spec: mujoco.MjSpec, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
     """Add a task's bodies to a scene that is being built.
 
-    Friction cones are elliptic, with which grips slip least: 8 mm in 6 s for 5 kg shaken at 3
-    m/s^2, instead of 31 mm with MuJoCo's defaults.
+    Friction cones are elliptic, for which gripped objects slip least: 8 mm in 6 s for 5 kg that are
+    shaken at 3 m/s^2, instead of 31 mm with MuJoCo's defaults.
 
     Args:
-        spec: the scene.
-        task_scene: the task's bodies.
-        foot_world: place of the robot's foot [m].
+        spec: specification of the scene.
+        task_scene: the task's part of the scene.
+        foot_world: position of the robot's base [m].
     """
     if task_scene.mjcf:
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
         child = mujoco.MjSpec.from_string(task_scene.mjcf)
         for geom in (each for body in child.bodies if _is_free(body) for each in body.geoms):
-            geom.group = DECORATION  # solid geoms must not move
+            geom.group = DECORATION  # because solid geoms must not move
         frame = spec.worldbody.add_frame(pos=list(foot_world))
         spec.attach(child, prefix=PREFIX, frame=frame)
 
 
 def add_welds(spec: mujoco.MjSpec, task_scene: TaskScene) -> None:
-    """Add a task's welds to a scene that has all of their sites."""
+    """Add a task's welds to a scene that already contains their sites."""
     kinds = {True: mujoco.mjtEq.mjEQ_WELD, False: mujoco.mjtEq.mjEQ_CONNECT}
     for weld in task_scene.welds:
         spec.add_equality(
@@ -75,23 +75,24 @@ def add_welds(spec: mujoco.MjSpec, task_scene: TaskScene) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Objects:
-    """The O loose objects of a scene, in their own frames."""
+    """The O loose objects of a scene, in their body frames."""
 
     names: tuple[str, ...]
     """Names of the objects."""
     first: int
     """Index of the first object in `qpos` and `qvel`, after the robot's joints."""
     half_size_m: Points3
-    """(O, 3) half edges of each object's bounding box, with its middle at the origin [m]."""
+    """(O, 3) half edge lengths of each object's bounding box, which is centred at the origin
+    [m]."""
     parts: Floats
-    """(O, n, `shapes.WIDTH`) boxes of each object; surplus rows are absent shapes."""
+    """(O, n, `shapes.WIDTH`) boxes of each object; unused rows are absent shapes."""
     capsules: Capsules
-    """(O, n, 2, 3) capsules that represent each object [m]; surplus rows are NaN."""
+    """(O, n, 2, 3) capsules that represent each object [m]; unused rows are NaN."""
     capsule_radius_m: Floats
-    """(O, n) radii of these capsules [m]."""
+    """(O, n) radii of the capsules [m]; 0 in unused rows."""
 
     def poses(self, qpos: Floats) -> Floats:
-        """Return (..., O, 7) position [m] and quaternion of each object, from qpos (..., nq)."""
+        """Return position [m] and quaternion (..., O, 7) of each object, from qpos (..., nq)."""
         rows = qpos[..., self.first : self.first + POSE * len(self.names)]
         return rows.reshape(*qpos.shape[:-1], len(self.names), POSE)
 
@@ -100,34 +101,34 @@ class BoxCapsule(NamedTuple):
     """A capsule that represents a part of a box, in the frame of the box."""
 
     ends: Points3
-    """(2, 3) end points of its axis [m]."""
+    """(2, 3) end points of the capsule's axis [m]."""
     radius_m: float
-    """Radius [m]."""
+    """Radius of the capsule [m]."""
 
 
 class PaddedCapsules(NamedTuple):
-    """Capsules of several objects in one array."""
+    """Capsules of several objects in padded arrays."""
 
     ends: Capsules
-    """(O, n, 2, 3) end points of their axes [m]; surplus rows are NaN."""
+    """(O, n, 2, 3) end points of the capsules' axes [m]; unused rows are NaN."""
     radius_m: Floats
-    """(O, n) radii [m]; 0 in surplus rows."""
+    """(O, n) radii of the capsules [m]; 0 in unused rows."""
 
 
 class LoadedArm(NamedTuple):
-    """Robots with the objects that they hold as part of them."""
+    """Robots, including the objects that they hold."""
 
     robot: RobotState
-    """State of the robots, with the objects' capsules."""
+    """State of the robots, including the capsules of held objects."""
     path_world: Capsules
     """(B, T, K, 2, 3) capsules of robot and objects along a path [m]."""
 
 
 def find_objects(spec: mujoco.MjSpec, first: int) -> Objects:
-    """Return the free bodies of a scene, after `first` joints of the robot.
+    """Find the free bodies of a scene; their coordinates follow those of `first` robot joints.
 
     Raises:
-        ConfigError: a body has other shapes than boxes, or its boxes' middle is not its origin.
+        ConfigError: a body does not consist of boxes, or its boxes are not centred at its origin.
     """
     bodies = [body for body in spec.bodies if _is_free(body)]
     half = np.zeros((len(bodies), 3))
@@ -158,12 +159,12 @@ def find_objects(spec: mujoco.MjSpec, first: int) -> Objects:
 def fit_capsules(centre: Points3, half_size: Points3) -> list[BoxCapsule]:
     """Return capsules that represent a box.
 
-    They lie along its longest edges, side by side along the second, as thick as the third. They
-    deviate from boxes up to 4 cm thick by at most 1 cm.
+    The capsules are parallel to the longest edges, lie side by side along the second longest, and
+    are as thick as the shortest. For boxes up to 4 cm thick, they deviate by at most 1 cm.
 
     Args:
-        centre: (3,) middle of the box [m].
-        half_size: (3,) half edges [m].
+        centre: (3,) centre of the box [m].
+        half_size: (3,) half edge lengths of the box [m].
     """
     long, wide, thin = np.argsort(half_size)[::-1]
     radius = max(float(half_size[thin]), THINNEST_M)
@@ -179,7 +180,7 @@ def fit_capsules(centre: Points3, half_size: Points3) -> list[BoxCapsule]:
 
 
 def place_parts(objects: Objects, qpos: Floats) -> Floats:
-    """Return (B, O * n, `shapes.WIDTH`) the boxes of all objects in the world, at qpos (B, nq)."""
+    """Return all objects' boxes (B, O * n, `shapes.WIDTH`) in the world, at qpos (B, nq)."""
     poses = objects.poses(qpos)
     kinds = np.tile(np.arange(len(objects.names)), (len(qpos), 1))
     return place_shapes(kinds, poses[..., :3], poses[..., 3:], objects.parts)
@@ -190,8 +191,8 @@ def make_object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools)
 
     Args:
         objects: the O objects.
-        qpos: (B, nq) positions.
-        qvel: (B, nv) velocities.
+        qpos: (B, nq) generalized positions.
+        qvel: (B, nv) generalized velocities.
         held: (B, O) whether the robot holds each object.
     """
     poses, n = objects.poses(qpos), len(objects.names)
@@ -201,15 +202,15 @@ def make_object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools)
 
 
 def find_held(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandState) -> Bools:
-    """Return (B, O) whether closed fingers hold each object.
+    """Return a mask (B, O) of the objects that closed fingers hold.
 
-    They hold the object that contains the tool point, or is within `GRIP_M` of it.
+    Closed fingers hold the object that contains the tool point or is within `GRIP_M` of it.
 
     Args:
         objects: the O objects.
-        qpos: (B, nq) positions.
+        qpos: (B, nq) generalized positions.
         tool_world: (B, 3) tool points [m].
-        hand: the grippers.
+        hand: state of the grippers.
     """
     held = np.zeros((len(qpos), len(objects.names)), bool)
     _find_held(objects.poses(qpos), objects.half_size_m, tool_world, hand.closed_on, held)
@@ -219,7 +220,7 @@ def find_held(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandSta
 def attach_objects(
     robot: RobotState, path_world: Capsules, objects: Objects, q_path: Floats, held: Bools
 ) -> LoadedArm:
-    """Return the robots with the objects that they hold as part of them.
+    """Return the robots, with the objects that they hold as parts of the robots.
 
     Args:
         robot: state of the robots.
@@ -245,7 +246,7 @@ def _is_free(body: mujoco.MjsBody) -> bool:
 
 
 def _pad_parts(parts: list[list[Floats]]) -> Floats:
-    """Return (O, n, `shapes.WIDTH`) the boxes of each object; surplus rows are absent shapes."""
+    """Return the boxes of each object as (O, n, `shapes.WIDTH`), padded with absent shapes."""
     n = max(map(len, parts), default=0)
     table = np.broadcast_to(absent_shape(), (len(parts), n, WIDTH)).copy()
     for row, boxes in zip(table, parts, strict=True):
@@ -254,7 +255,7 @@ def _pad_parts(parts: list[list[Floats]]) -> Floats:
 
 
 def _pad_capsules(capsules: list[list[BoxCapsule]]) -> PaddedCapsules:
-    """Return the capsules of each object in one array."""
+    """Return the capsules of all objects in padded arrays."""
     n = max(map(len, capsules), default=0)
     padded = PaddedCapsules(np.full((len(capsules), n, 2, 3), np.nan), np.zeros((len(capsules), n)))
     for row, of_object in enumerate(capsules):
@@ -271,10 +272,10 @@ def _find_held(
 
     Args:
         poses: (B, O, 7) poses of the boxes, position [m] and quaternion (w, x, y, z).
-        half_size: (O, 3) half edges of the boxes [m].
+        half_size: (O, 3) half edge lengths of the boxes [m].
         tool_world: (B, 3) tool points [m].
         closed_on: (B,) whether the fingers have closed on something.
-        held: (B, O) of which the held box is set to true.
+        held: (B, O) output, in which the entry of the held box is set to true.
     """
     for b in range(len(poses)):
         nearest, chosen = GRIP_M, -1
@@ -292,13 +293,13 @@ def _find_held(
 
 @kernel
 def _place_loads(poses: Floats, capsules: Capsules, held: Bools, loads: Floats) -> None:
-    """Write the capsules of held objects in the world; those of others are at `AWAY_M`.
+    """Compute the capsules of held objects in the world; those of others are moved to `AWAY_M`.
 
     Args:
         poses: (B, T, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
-        capsules: (O, n, 2, 3) their capsules in their own frames [m]; surplus rows are NaN.
+        capsules: (O, n, 2, 3) capsules of the objects in the body frames [m]; unused rows are NaN.
         held: (B, O) whether the robot holds each object.
-        loads: (B, T, O, n, 2, 3) written [m].
+        loads: (B, T, O, n, 2, 3) output, which is filled [m].
     """
     for b, t, o in np.ndindex(poses.shape[:3]):
         pose = poses[b, t, o]

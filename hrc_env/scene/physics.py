@@ -1,7 +1,7 @@
-"""Physics of many copies of one scene, stepped together: robots follow commands, workers walk.
+"""Physics of a batch of copies of one scene, in which robots follow commands and workers move.
 
-The whole state is in the rows of one `mujoco.batch.Batch`, for any batch size: a copy of the rows
-is a copy of the simulation, and results do not depend on the other environments of a batch.
+The complete state is in the rows of one `mujoco.batch.Batch`, for any batch size: a copy of the
+rows is a copy of the simulation, and results do not depend on the other environments of a batch.
 """
 
 import math
@@ -26,25 +26,26 @@ from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 from hrc_env.world import Effects
 
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
-"""Inputs of a substep without workers: servo commands."""
+"""MuJoCo's input fields of a substep without workers: servo commands."""
 INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
-"""Inputs of a substep with workers: servo commands, positions and rotations of their bodies."""
+"""MuJoCo's input fields of a substep with workers: servo commands and poses of worker bodies."""
 ARM_FIELDS = ("time", "qpos", "qvel", "act", "qacc_warmstart")
 """Fields of the state that determine the motion of the robot."""
 OBJECT_FIELDS = ("eq_active", "xfrc_applied")
 """Further fields that determine the motion of loose objects."""
 PRESSING_N = 40.0
-"""Force above which fingers press on an object [N]."""
+"""Force above which fingers count as pressing on an object [N]."""
 RESTING_M_S = 0.01
-"""Speed below which fingers are at rest [m/s]; fingers that press and rest have closed."""
+"""Speed below which fingers are at rest [m/s]; fingers that press and are at rest count as
+closed."""
 END_MARGIN_RAD = 0.02
-"""Distance from the end of a joint's range at which it comes to rest [rad], of a slide [m]."""
+"""Distance from the end of its range at which a joint is stopped [rad], or [m] for a slide."""
 BRAKE_SHARE = 0.7
-"""Share of the slew limit with which joints brake before the ends of their ranges."""
+"""Fraction of the slew limit with which joints brake before the ends of their ranges."""
 
 
 class Servo:
-    """Limits and servos of a joint; the units are of a hinge, of a slide they are in metres."""
+    """Limits and servos of a joint, in units for a hinge; for a slide, [m] replaces [rad]."""
 
     low: float
     """Lower end of the joint's range [rad]."""
@@ -53,38 +54,39 @@ class Servo:
     fastest: float
     """Velocity limit [rad/s]."""
     slew: float
-    """Limit on the change of the commanded velocity [rad/s^2]."""
+    """Limit on the rate of change of the commanded velocity [rad/s^2]."""
     lead: float
-    """Lead of the rate servo [s]."""
+    """Lead time of the rate servo [s]."""
     clamp: float
-    """Limit on the lead of the holding servo's angle over the joint's [rad]."""
+    """Limit on the difference between the angles of the holding servo and the joint [rad]."""
 
 
 SERVO = dtype_of(Servo)
 
 
 class SharedField(NamedTuple):
-    """A field of the same environments without and with workers."""
+    """Views of a field in the simulations without and with workers."""
 
     alone: Floats
-    """(B, ...) in the simulations without workers."""
+    """(B, ...) field in the simulations without workers."""
     beside: Floats
-    """(B, ...) the same entries in the simulations with workers, whose bodies come last."""
+    """(B, ...) the same entries in the simulations with workers, in which worker bodies come
+    last."""
 
 
 class Saved(NamedTuple):
-    """Simulations in a pickle."""
+    """Content of a pickle of `Physics`."""
 
     scene: Scene
     """The scene."""
     batch: int
     """Number of simulations, B."""
     state: Floats
-    """(B, n) the whole state."""
+    """(B, n) complete state."""
 
 
 class Physics:
-    """B simulations of a scene.
+    """A batch of B simulations of a scene.
 
     Args:
         scene: the scene.
@@ -115,27 +117,27 @@ class Physics:
 
     @property
     def q(self) -> JointAngles:
-        """(B, N) joint angles of the robots [rad], a copy."""
+        """Copy of the joint angles (B, N) of the robots [rad]."""
         return self._qpos[:, : self._n].copy()
 
     @property
     def qd(self) -> JointVelocities:
-        """(B, N) joint velocities of the robots [rad/s], a copy."""
+        """Copy of the joint velocities (B, N) of the robots [rad/s]."""
         return self._qvel[:, : self._n].copy()
 
     @property
     def command(self) -> JointVelocities:
-        """(B, N) commanded joint velocities [rad/s], a copy."""
+        """Copy of the commanded joint velocities (B, N) [rad/s]."""
         return self._command.copy()
 
     @property
     def qpos(self) -> Floats:
-        """(B, nq) joint angles [rad], fingers' displacements [m] and objects' poses, a copy."""
+        """Copy of the generalized positions (B, nq) of robot [rad], fingers [m] and objects."""
         return self._qpos.copy()
 
     @property
     def qvel(self) -> Floats:
-        """(B, nv) velocities of joints, fingers and objects, a copy."""
+        """Copy of the generalized velocities (B, nv) of robot, fingers and objects."""
         return self._qvel.copy()
 
     def hand_state(self, ids: Ints) -> HandState | None:
@@ -154,12 +156,12 @@ class Physics:
         return HandState(opening_m, force_n, (force_n > PRESSING_N) & still)
 
     def held(self, ids: Ints, tool_world: Points3, hand: HandState) -> Bools:
-        """Return (n, O) whether the hands of environments `ids` (n,) hold each object.
+        """Return a mask (n, O) of the objects that the hands of environments `ids` (n,) hold.
 
         Args:
-            ids: (n,) the environments in question.
-            tool_world: (n, 3) their tool points [m].
-            hand: state of their hands.
+            ids: (n,) indices of the environments.
+            tool_world: (n, 3) tool points of the robots [m].
+            hand: state of the hands.
         """
         objects, cups = self.scene.objects, self.scene.cups
         if cups is None:
@@ -169,7 +171,7 @@ class Physics:
         return held
 
     def apply(self, effects: Effects | None) -> None:
-        """Apply a task's welds and forces to loose objects until the next call; None keeps them."""
+        """Apply a task's welds and forces on objects until the next call; None keeps them."""
         if effects is None:
             return
         for name, is_on in effects.welded.items():
@@ -177,7 +179,7 @@ class Physics:
         self._push[:, self.scene.object_bodies] = effects.push_world
 
     def _switch_cups(self, cups: Cups, is_on: Bools) -> None:
-        """Vent cups, or let them seal where `is_on` (B,); a load above the limit is torn off."""
+        """Vent cups, or let them seal if `is_on` (B,); a load above the limit tears objects off."""
         q, welded = self._qpos[:, : self._n], self._welded[:, cups.welds] > 0.0
         tool, poses = tool_frame(self.scene.chain, q), self.scene.objects.poses(self._qpos)
         near = find_sealed(cups, tool, poses)
@@ -187,12 +189,12 @@ class Physics:
     def reset(
         self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
     ) -> None:
-        """Put environments to rest, with open hands.
+        """Reset environments to a state at rest, with open hands.
 
         Args:
-            ids: (n,) the environments in question, sorted.
-            q: (n, N) their joint angles [rad].
-            body: (n, W) index of each worker's body among the scene's; None for the first.
+            ids: (n,) sorted indices of the environments.
+            q: (n, N) joint angles of the robots [rad].
+            body: (n, W) index of each worker's body in the scene's `bodies`; None for the first.
             poses: (n, O, 7) poses of loose objects; None for those of the task's MJCF.
         """
         ids = np.asarray(ids, int)
@@ -218,20 +220,21 @@ class Physics:
         """Advance every environment by one control step.
 
         Args:
-            qd_command: (B, N) wanted joint velocities [rad/s]; they are limited here in size and
-                slew, and braked before the ends of the joints' ranges.
+            qd_command: (B, N) wanted joint velocities [rad/s]; their magnitude and slew are
+                limited, and they are reduced near the ends of the joints' ranges.
             workers: poses of the workers after every substep, arrays (B, T, W, S, ...); W may be 0.
-            out_of_reach: (B,) whether no worker can touch the robot in this step; None for no
-                environment. The robot then moves as without workers, bit for bit, and faster.
-            grip: (B,) command of the hands from -1, open, to 1, closed; cups are on above 0. None
-                for open hands.
+            out_of_reach: (B,) whether no worker can touch the robot in this step, for which the
+                simulation without workers gives the same result faster; None if this is so for no
+                environment.
+            grip: (B,) command of the hands from -1 (open) to 1 (closed); cups are active above 0.
+                None for open hands.
 
         Returns:
             (B, T, nq) `qpos` after every substep.
 
         Raises:
             ConfigError: the arrays have wrong shapes.
-            HRCError: the physics broke down; the error names the reason.
+            HRCError: the physics became unstable; the error names the reason.
         """
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
         self._check_workers(workers)
@@ -261,10 +264,10 @@ class Physics:
         return self._trace.copy()
 
     def find_contact(self, q: JointAngles) -> str | None:
-        """Return the names of two geoms that touch with the robot at angles q (N,) [rad].
+        """Return the names of two geoms in contact if the robot is at angles q (N,) [rad].
 
-        Contacts of the robot with itself count, too. Loose objects have the poses of the MJCF, and
-        there are no workers. None if nothing touches.
+        Self-collisions of the robot count as contacts. Loose objects have the poses of the MJCF,
+        and there are no workers. Return None if there is no contact.
         """
         model = without_workers(self.scene).model
         data = mujoco.MjData(model)
@@ -277,11 +280,11 @@ class Physics:
         return None
 
     def get_state(self) -> Floats:
-        """Return (B, n) the whole state; `set_state` restores it bit for bit."""
+        """Return the complete state (B, n), which `set_state` restores exactly."""
         return self._sims.state.copy()
 
     def set_state(self, state: Floats) -> None:
-        """Restore a state that `get_state` returned, of the same scene and batch size."""
+        """Restore a state from `get_state` of the same scene and batch size."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
         self._set_capsules(np.arange(self.batch))
@@ -294,14 +297,14 @@ class Physics:
         self.set_state(saved.state)
 
     def _set_capsules(self, ids: Ints) -> None:
-        """Set the capsules of the workers of environments `ids` to those of their bodies."""
+        """Set the workers' capsules in environments `ids` to those of their bodies."""
         body, geoms = self._body[ids].astype(np.int64), self.scene.worker_capsules
         known = capsule_shapes(self.scene.bodies) if self._shapes else {}
         for name, shapes in self._shapes.items():
             shapes[ids[:, None, None], geoms] = known[name][body]
 
     def _check_workers(self, workers: WorkerPath) -> None:
-        """Check the axes of a path, and resize the buffers for its number of substeps."""
+        """Check the shape of a path, and resize the buffers for its number of substeps."""
         rows, n_substeps = self.scene.worker_mocap, workers.position_world.shape[1]
         expected = (self.batch, max(n_substeps, 1), *rows.shape[:1])
         meaning = "batch, substeps (at least one), workers"
@@ -312,7 +315,7 @@ class Physics:
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
     def _simulate(self, is_selected: Bools, workers: WorkerPath | None) -> None:
-        """Simulate the substeps of some environments (B,), beside workers or (None) without."""
+        """Simulate selected environments (B,) with workers or, if they are None, without."""
         n = np.count_nonzero(is_selected)
         if n == 0:
             return
@@ -337,7 +340,7 @@ class Physics:
             beside[rows] = alone[rows]
 
     def _check_health(self) -> None:
-        """Raise `HRCError` for MuJoCo's warnings of an exploding state or a full memory."""
+        """Raise `HRCError` if MuJoCo warns of a diverging state or insufficient memory."""
         for sims in (self._sims, self._alone):
             if np.count_nonzero(sims.warning):
                 environment, kind, _ = np.argwhere(sims.warning)[0]
@@ -349,19 +352,19 @@ class Physics:
 
 
 def _bind_shared(alone: Batch, beside: Batch, field: str) -> SharedField:
-    """Return views of a field in simulations without and with workers."""
+    """Bind views of a field in simulations without and with workers."""
     less, more = alone.bind(field), beside.bind(field)
     return SharedField(less, more[:, : less.shape[1]] if less.ndim > 1 else more)
 
 
 def make_empty_path(batch: int, n_substeps: int) -> WorkerPath:
-    """Return the path of no workers, arrays (B, T, 0, 22, ...), for scenes without them."""
+    """Return a path without workers, arrays (B, T, 0, 22, ...), for scenes without workers."""
     shape = (batch, n_substeps, 0, 22)
     return WorkerPath(np.zeros((*shape, 3)), np.zeros((*shape, 4)))
 
 
 def _make_servos(scene: Scene) -> Records1[Servo]:
-    """Return (N,) limits and servos of a scene's robot."""
+    """Return the limits and servos (N,) of the joints of a scene's robot."""
     servos, config, chain = make_records(Servo, scene.chain.n_joints), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
@@ -381,23 +384,24 @@ def _substep_commands(
     sim_dt: float,
     control: Floats,
 ) -> None:
-    """Write the commands of one control step, limited in size, slew and before the joints' ends.
+    """Compute the servo commands of one control step within the limits of the joints.
 
-    The rate servo's command runs ahead by its lead, so that its torque provides the acceleration
-    and the holding servo does not lag.
+    Velocities are limited in magnitude and slew, and near the ends of the joints' ranges. The
+    command of the rate servo is advanced by its lead time, so that its torque provides the
+    acceleration and the holding servo does not lag.
 
     Args:
         q: (B, N) joint angles [rad].
         qd: (B, N) joint velocities [rad/s].
         held: (B, N) angles of the holding servos [rad]; they are kept near those of a blocked
-            robot, so that it moves on at once.
-        command: (B, N) command in force [rad/s], which is advanced by the control step.
+            robot, so that it can move immediately afterwards.
+        command: (B, N) present command [rad/s], which is advanced by the control step.
         wanted: (B, N) wanted velocities [rad/s]; values that are not finite count as 0.
         servos: (N,) limits and servos of the joints.
         sim_dt: duration of a substep [s].
-        control: (B, T, 2 N) written [rad/s]: each substep's mean velocity for the holding servos,
-            so that their integral does not depend on the length of a substep, then the velocity at
-            its end for the rate servos.
+        control: (B, T, 2 N) output [rad/s]: for the holding servos the mean velocity of each
+            substep, because its integral does not depend on the duration of a substep; then for the
+            rate servos the velocity at the end of each substep.
     """
     n_substeps, n = control.shape[1], q.shape[1]
     ctrl_dt = sim_dt * n_substeps

@@ -1,4 +1,4 @@
-"""Scenes by name: cameras, floor plan and workplaces (`assets/scenes/NAME.toml`), and obstacles."""
+"""Cameras, floor plans and workplaces of scenes (`assets/scenes/NAME.toml`), and obstacles."""
 
 import math
 from dataclasses import dataclass, replace
@@ -30,11 +30,12 @@ from hrc_env.world import Grounds, Workplace
 ROBOT_CLEARANCE_M = 0.8
 """Distance that workers' paths keep from the axis of the robot's first joint [m]."""
 HEADROOM_M = 2.1
-"""Height of a shape's lower end above which it blocks no worker [m], of any height with a hat."""
+"""Height of a shape's lower end above which it obstructs no worker [m], even tall ones with a
+hat."""
 STEP_OVER_M = 0.02
-"""Height of a shape's upper end below which it blocks no worker [m]."""
+"""Height of a shape's upper end below which it obstructs no worker [m]."""
 UPRIGHT = 0.999
-"""Cosine from which on a box counts as standing upright."""
+"""Cosine of the tilt above which a box counts as upright."""
 KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: PLANE,
     mujoco.mjtGeom.mjGEOM_BOX: BOX,
@@ -42,36 +43,36 @@ KINDS = {
     mujoco.mjtGeom.mjGEOM_CAPSULE: CAPSULE,
     mujoco.mjtGeom.mjGEOM_SPHERE: CAPSULE,
 }
-"""Kinds of shapes that block sight, by MuJoCo's kinds of geoms."""
+"""Kinds of occluding shapes, by MuJoCo's types of geoms."""
 LEFT_AT = {"pile": "box", "floor": "box", "cart": "cart"}
-"""Props that may stand on the floor, by the kinds of workplaces."""
+"""Props that may stand on the floor, by kind of workplace."""
 Footprint = tuple[float, float, float, float, float]
-"""A row of `Grounds.blocked`."""
+"""Type of a row of `Grounds.blocked`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """Description of a scene beside its MJCF, `NAME.xml`, or `NAME_bare.xml` without clutter."""
+    """Description of a scene with the MJCF `NAME.xml` or, without clutter, `NAME_bare.xml`."""
 
     mount_world: tuple[float, float, float]
-    """Place of the robot's foot [m]."""
+    """Position of the robot's base [m]."""
     walkable_x_m: tuple[float, float]
-    """Least and greatest x of the area where workers stand and walk [m]."""
+    """Minimum and maximum x of the area where workers stand and walk [m]."""
     walkable_y_m: tuple[float, float]
-    """Least and greatest y of that area [m]."""
+    """Minimum and maximum y of the area where workers stand and walk [m]."""
     cameras: tuple[CameraConfig, ...]
-    """Cameras of the scene, if the settings have none."""
+    """Default cameras of the scene."""
     places: tuple[Workplace, ...]
-    """Workplaces."""
+    """Workplaces that exist both with and without clutter."""
     clutter_places: tuple[Workplace, ...]
-    """Further workplaces with clutter."""
+    """Further workplaces that exist only with clutter."""
     ceiling_m: float | None = None
     """Height of the ceiling [m]; None for a scene that is open to the sky."""
     open_walls: tuple[Footprint, ...] = ()
-    """Footprints with clutter that people do not walk through; each replaces the footprints of the
-    shapes that it contains."""
+    """Footprints of open walls in the clutter, which people do not walk through; each replaces the
+    footprints of the shapes that it contains."""
     flat: tuple[Footprint, ...] = ()
-    """Footprints with clutter that block the floor and occlude nothing."""
+    """Footprints in the clutter that obstruct the floor and occlude nothing."""
 
     def grounds(
         self, obstacles: Floats, clutter: bool, further: tuple[Workplace, ...] = ()
@@ -80,8 +81,8 @@ class Room:
 
         Args:
             obstacles: (G, `shapes.WIDTH`) fixed shapes.
-            clutter: whether furniture and building material stand there.
-            further: workplaces of a task, relative to the robot's foot.
+            clutter: whether the scene contains furniture and building material.
+            further: workplaces of a task, relative to the robot's base.
         """
         robot_xy_m = self.mount_world[:2]
         blocked = find_footprints(obstacles, robot_xy_m)
@@ -111,11 +112,11 @@ SCENES: dict[str, Room] = {
 
 
 def block_loads(grounds: Grounds, obstacles: Floats) -> Grounds:
-    """Return the floor plan for a mobile base, which the pedestal and the places of loads block.
+    """Return the floor plan for a mobile base, with pedestal and loads as further obstacles.
 
     Args:
-        grounds: the floor plan for workers.
-        obstacles: (G, `shapes.WIDTH`) fixed shapes, the pedestal among them.
+        grounds: floor plan for workers.
+        obstacles: (G, `shapes.WIDTH`) fixed shapes, including the pedestal.
     """
     x, y = grounds.robot_xy_m
     standing = find_footprints(obstacles, (math.inf, math.inf))
@@ -134,10 +135,10 @@ def _load_footprint(place: Workplace) -> Footprint:
 
 
 def find_obstacles(model: mujoco.MjModel) -> Floats:
-    """Return the solid geoms of a scene, (G, `shapes.WIDTH`).
+    """Return the solid geoms of a scene as shapes (G, `shapes.WIDTH`).
 
     Raises:
-        HRCError: a solid geom moves, or is of a kind that is not in `KINDS`.
+        HRCError: a solid geom can move, or its type is not in `KINDS`.
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -167,14 +168,14 @@ def _shape_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
 
 
 def find_footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Floats:
-    """Return (N, 5) the footprints of the shapes that block the floor, as in `Grounds.blocked`.
+    """Return the footprints (N, 5) of shapes that obstruct the floor, as in `Grounds.blocked`.
 
-    Footprints of upright boxes are exact, those of other shapes are rectangles along x and y. A
-    shape on the robot's axis is its pedestal, and is left out.
+    Footprints of upright boxes are exact, those of other shapes are bounding rectangles along x and
+    y. A shape on the robot's axis is its pedestal, and is omitted.
 
     Args:
         obstacles: (G, `shapes.WIDTH`) fixed shapes.
-        robot_xy_m: axis of the robot's first joint, x and y [m].
+        robot_xy_m: position of the robot's first joint axis, x and y [m].
     """
     rows = []
     for row in obstacles[obstacles[:, KIND] != PLANE]:
@@ -190,7 +191,7 @@ def find_footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Float
 
 
 def _half_extent(row: Floats) -> Floats:
-    """Return (3,) the half size of the bounding box of a shape along x, y and z [m]."""
+    """Return the half size (3,) of a shape's axis-aligned bounding box [m]."""
     axes, half = np.abs(row[AXES:HALF_SIZE].reshape(3, 3)), row[HALF_SIZE : HALF_SIZE + 3]
     if row[KIND] == BOX:
         return half @ axes
@@ -198,7 +199,7 @@ def _half_extent(row: Floats) -> Floats:
 
 
 def is_within(points: Floats, footprints: Floats) -> Bools:
-    """Return (N,) whether points x, y, ... (N, 2 or more) are in one of the footprints (M, 5)."""
+    """Return a mask (N,) of the points x, y, ... (N, 2 or more) in any of footprints (M, 5)."""
     x, y, half_length, half_width, yaw = footprints.T
     dx, dy = points[:, :1] - x, points[:, 1:2] - y
     along, aside = np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx

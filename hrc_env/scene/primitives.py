@@ -1,8 +1,8 @@
-"""Groups and collision bits of geoms, and capsules.
+"""Groups and collision bits of geoms, and functions for capsules.
 
-Groups: 0 solid (drawn, collides, occludes), 1 decoration (drawn only), 2 the robot's visual geoms,
-3 the robot's capsules (not drawn, occlude), 4 the workers' capsules (not drawn, do not occlude),
-5 ceiling and lamps.
+The groups are 0 solid (rendered, collides, occludes), 1 decoration (only rendered), 2 the robot's
+visual geoms, 3 the robot's capsules (not rendered, occlude), 4 the workers' capsules (neither
+rendered nor occluding), and 5 ceiling and lamps.
 """
 
 from collections.abc import Sequence
@@ -14,20 +14,21 @@ import numpy as np
 from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz
 
 SOLID, DECORATION, ROBOT_LOOKS, ROBOT_CAPSULES, WORKER_CAPSULES, OVERHEAD = range(6)
-"""Groups of geoms."""
+"""Group numbers of geoms."""
 SCENE_BIT, ROBOT_BIT, WORKER_BIT, PAD_BIT, OBJECT_BIT = 1, 2, 4, 8, 16
-"""Bits of `contype`; a geom touches another one if it has the other's bit in its `conaffinity`."""
+"""Bits of `contype`; a geom collides with another one if its `conaffinity` contains the other's
+bit."""
 Vector = Sequence[float] | Floats
-"""A vector (3,)."""
+"""Type of a vector (3,)."""
 LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
-"""Fields of a geom that is drawn and touches nothing."""
+"""Fields of a geom that is rendered but collides with nothing."""
 
 
 class RodPose(NamedTuple):
     """Pose of a rod between two points."""
 
     centre: Points3
-    """(3,) middle between the two points [m]."""
+    """(3,) midpoint between the two points [m]."""
     quaternion_wxyz: QuaternionsWxyz
     """(4,) rotation of the rod, with its axis along z."""
     half_length: float
@@ -49,8 +50,8 @@ def add_capsule(
 
     Args:
         body: the body.
-        start: (3,) one end of the capsule's axis, in the body's frame [m].
-        end: (3,) the other end [m].
+        start: (3,) first end of the capsule's axis, in the body's frame [m].
+        end: (3,) second end of the capsule's axis, in the body's frame [m].
         radius: radius of the capsule [m].
         fields: further fields of the geom.
     """

@@ -1,8 +1,8 @@
-"""Pictures of the scene: plain crops for the detector, and pictures with shadows for people.
+"""Rendering of the scene: plain crops for the detector, and pictures with shadows for viewers.
 
-A crop is drawn through an off-centre frustum and has the same pixels as a crop of the camera's
-whole image. It has no shadows and no antialiasing, which take two thirds of the time and change no
-landmark.
+A crop is rendered through an off-centre frustum and has the same pixels as a crop of the camera's
+whole image. It is rendered without shadows and antialiasing, which would take two thirds of the
+time and change no landmark.
 """
 
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ CROP_QUALITY = {
     "numstacks": 3,
     "numquads": 1,
 }
-"""MuJoCo's visual quality of crops."""
+"""MuJoCo's visual quality settings for crops."""
 PICTURE_QUALITY = {
     "offsamples": 4,
     "shadowsize": 8192,
@@ -37,9 +37,9 @@ PICTURE_QUALITY = {
     "numstacks": 20,
     "numquads": 4,
 }
-"""MuJoCo's visual quality of pictures for people."""
+"""MuJoCo's visual quality settings for pictures for viewers."""
 WINDOWS_KEPT = 40
-"""Largest number of windows of a camera with a stored background, those of a search included."""
+"""Maximum number of windows per camera with a stored background, including those of a search."""
 
 
 class StillPicture(NamedTuple):
@@ -48,7 +48,7 @@ class StillPicture(NamedTuple):
     rgb: Image
     """(H, W, 3) colours, top row first."""
     z: NDArray[np.float32]
-    """(H, W) depths from 1 near to 0 far, bottom row first."""
+    """(H, W) depths from 1 (near) to 0 (far), bottom row first."""
 
 
 VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
@@ -61,13 +61,13 @@ VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, floa
     "yard": ((4.6, -8.6, 14.6), (0.3, -0.3, 0.0), 56.0),
     "overview": ((8.9, -6.4, 4.3), (-0.7, 0.6, 1.3), 68.0),
 }
-"""Viewpoints of pictures for people: eye [m], target [m], horizontal field of view [deg]."""
+"""Viewpoints of pictures for viewers: eye [m], target [m] and horizontal field of view [deg]."""
 OPEN_ROOF = ("outside", "top", "overview", "yard")
-"""Viewpoints from which ceiling and lamps are left out."""
+"""Viewpoints for which ceiling and lamps are hidden."""
 
 
 def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
-    """Return the camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
+    """Return the camera of one of `VIEWPOINTS`, for pictures of a given size [px]."""
     eye, target, hfov_deg = VIEWPOINTS[name]
     return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
 
@@ -75,8 +75,8 @@ def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
 class CropRenderer(Canvas):
     """Renderer of square crops of the cameras' images, for the detector.
 
-    From the second picture of a window on, the moving geoms are drawn over a stored picture of the
-    static ones, by depth: the same pixels in half the time.
+    From the second picture of a window on, only the moving geoms are rendered and merged by depth
+    with a stored picture of the static ones. This gives the same pixels in half the time.
 
     Args:
         scene: the scene.
@@ -91,7 +91,7 @@ class CropRenderer(Canvas):
         self._z = np.empty((size_px, size_px), np.float32)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a rotated square (size, size, 3) of a camera's pinhole image, top row first.
+        """Render a rotated square (size, size, 3) of a camera's pinhole image, top row first.
 
         Args:
             camera_index: index of the camera among those of the scene.
@@ -99,13 +99,13 @@ class CropRenderer(Canvas):
 
         Raises:
             ConfigError: there is no such camera.
-            RenderingError: there is no OpenGL.
+            RenderingError: OpenGL is unavailable.
         """
         index = check_integer("Camera index", camera_index, 0, len(self.scene.cameras) - 1)
         return self.view(self.scene.cameras[index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Return a rotated square (size, size, 3) of any camera's pinhole image, top row first."""
+        """Render a rotated square (size, size, 3) of any camera's pinhole image, top row first."""
         key = _key(camera, window)
         if key not in self._kept:
             self._remember(key, None)
@@ -128,12 +128,12 @@ class CropRenderer(Canvas):
         return CropRenderer, (self.scene, self.size_px)
 
     def _show(self, part: Part, camera: PinholeCamera, window: Roi) -> None:
-        """Choose a part of the scene and a window of a camera for the next picture."""
+        """Choose the part of the scene and the window of a camera for the next picture."""
         self.show(part)
         self.aim(camera, window, window.side_px)
 
     def _remember(self, key: tuple[float, ...], still: StillPicture | None) -> None:
-        """Store a window as the latest one; its picture is None after its first use."""
+        """Store a window's picture as the latest one; it is None after the first use."""
         self._kept.pop(key, None)
         self._kept[key] = still
         while len(self._kept) > WINDOWS_KEPT * len(self.scene.cameras):
@@ -141,7 +141,7 @@ class CropRenderer(Canvas):
 
 
 def _key(camera: PinholeCamera, window: Roi) -> tuple[float, ...]:
-    """Return the numbers of a camera and of a window, by which a picture is stored."""
+    """Return the parameters of a camera and a window, which are the key of a stored picture."""
     numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
     side = (*window.centre_px, window.side_px, window.rotation_rad)
     return tuple(map(float, (*numbers, *side)))
@@ -151,13 +151,13 @@ def _key(camera: PinholeCamera, window: Roi) -> tuple[float, ...]:
 def _lay_over(
     rgb: Image, z: NDArray[np.float32], z_behind: NDArray[np.float32], out: Image
 ) -> None:
-    """Write the pixels of a picture that are nearer than those behind it.
+    """Merge a picture with a background by depth.
 
     Args:
-        rgb: (H, W, 3) the picture, bottom row first.
-        z: (H, W) its depths from 1 near to 0 far, bottom row first.
-        z_behind: (H, W) depths of the picture behind it, bottom row first.
-        out: (H, W, 3) the picture behind it, top row first, which is written.
+        rgb: (H, W, 3) picture, bottom row first.
+        z: (H, W) depths of the picture from 1 (near) to 0 (far), bottom row first.
+        z_behind: (H, W) depths of the background, bottom row first.
+        out: (H, W, 3) background, top row first, in which nearer pixels of the picture are written.
     """
     height, width = z.shape
     for row in range(height):
@@ -173,7 +173,7 @@ def _lay_over(
 
 
 class PictureRenderer(Canvas):
-    """Renderer of pictures for people: with shadows, smooth edges and named viewpoints."""
+    """Renderer of pictures for viewers, with shadows, antialiasing and named viewpoints."""
 
     def __init__(
         self,
@@ -188,7 +188,7 @@ class PictureRenderer(Canvas):
             scene: the scene.
             width_px: width of the pictures [px].
             height_px: height of the pictures [px].
-            quality: fields of MuJoCo's visual.quality by name.
+            quality: values of fields of MuJoCo's visual.quality by name.
         """
         super().__init__(scene, width_px, height_px, quality)
 
@@ -200,16 +200,16 @@ class PictureRenderer(Canvas):
         depth: bool = False,
         shadows: bool = True,
     ) -> Image | NDArray[np.float32]:
-        """Return a picture of the scene.
+        """Render a picture of the scene.
 
         Args:
             q: (N,) joint angles of the robot [rad].
             motion: poses of the workers of one environment, arrays (W, S, ...).
-            viewpoint: a name of `VIEWPOINTS`, the name of a camera of the rig, or any camera; the
-                picture has its horizontal field of view.
+            viewpoint: name in `VIEWPOINTS`, name of a camera of the rig, or any camera; the picture
+                has the horizontal field of view of that camera.
             depth: whether to return distances instead of colours.
-            shadows: whether lamps cast shadows; without them, drawing in software is several times
-                faster.
+            shadows: whether lamps cast shadows; rendering in software is several times faster
+                without shadows.
 
         Returns:
             (H, W, 3) colours, or (H, W) distances along the optical axis [m], top row first.
@@ -224,7 +224,7 @@ class PictureRenderer(Canvas):
         return self.depth_m() if depth else self.paint()
 
     def camera(self, viewpoint: str | PinholeCamera) -> PinholeCamera:
-        """Return the camera of a viewpoint, a name of `VIEWPOINTS` or of the rig, or a camera."""
+        """Return the camera of a viewpoint: a name in `VIEWPOINTS` or the rig, or a camera."""
         if isinstance(viewpoint, PinholeCamera):
             return viewpoint
         rig = {camera.name: camera for camera in self.scene.cameras}

@@ -1,7 +1,7 @@
-"""The camera rig: pinhole cameras and MuJoCo's cameras from settings.
+"""The camera rig: pinhole cameras and MuJoCo cameras that are made from settings.
 
-This is the only module that converts between OpenCV's camera axes (+X right, +Y down, +Z forward)
-and OpenGL's (+X right, +Y up, -Z forward).
+Only this module converts between OpenCV's camera axes (+X right, +Y down, +Z forward) and OpenGL's
+(+X right, +Y up, -Z forward).
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,7 @@ from hrc_env.scene.places import SCENES
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Rotation from OpenGL's to OpenCV's camera axes, which is its own inverse."""
 LAB_CAMERAS = SCENES["lab"].cameras
-"""Four cameras under the ceiling, one in each corner, as in the paper's laboratory."""
+"""Four cameras below the ceiling, one in each corner, as in the paper's laboratory."""
 SITE_CAMERAS = SCENES["site"].cameras
 """Four cameras on masts in the corners of the site."""
 
@@ -33,7 +33,8 @@ def select(
         use: names or indices from 0, in the order of the result; None for all.
 
     Raises:
-        ConfigError: an unknown name, an index outside the rig, a camera twice, or no camera.
+        ConfigError: a name is unknown, an index is out of range, a camera is selected twice, or no
+            camera is selected.
     """
     names = [camera.name for camera in cameras]
     for name in names:
@@ -59,7 +60,7 @@ def select(
 
 
 def _index(choice: int | str, names: list[str]) -> int:
-    """Return the index of a camera among the names, or raise `ConfigError` if there is none."""
+    """Return the index of a camera, given by index or name, or raise `ConfigError`."""
     if not isinstance(choice, str):
         return check_integer(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
     if choice not in names:
@@ -68,16 +69,16 @@ def _index(choice: int | str, names: list[str]) -> int:
 
 
 def make_cameras(cameras: Iterable[CameraConfig]) -> tuple[PinholeCamera, ...]:
-    """Return the cameras of a rig with their matrices, as trackers and renderers need them.
+    """Return the pinhole cameras of a rig, with the matrices that trackers and renderers need.
 
-    Each has `K` (3, 3) [px], `T_world_from_cam` (4, 4), `P` (3, 4), which projects world points [m]
-    to pinhole pixels, and the lens between these and the pixels of its image.
+    Each camera has `K` (3, 3) [px], `T_world_from_cam` (4, 4), `P` (3, 4), which projects world
+    points [m] to pinhole pixels, and the lens, which maps pinhole pixels to those of its image.
     """
     return tuple(map(_make_camera, cameras))
 
 
 def _make_camera(camera: CameraConfig) -> PinholeCamera:
-    """Return a camera; it has a lens if a plain pinhole would show another image."""
+    """Return a camera; its lens is None if its image is that of an ideal pinhole camera."""
     K, T_world_from_cam = intrinsics(camera), np.eye(4)
     T_world_from_cam[:3, :3], T_world_from_cam[:3, 3] = axes_of(camera), camera.eye_world
     plain = camera.lens.model == "none" and K[0, 0] == K[1, 1]
@@ -86,12 +87,12 @@ def _make_camera(camera: CameraConfig) -> PinholeCamera:
 
 
 def glcam_axes(camera: PinholeCamera) -> Rotations:
-    """Return R_world_from_glcam: the columns right, up and back of a pinhole camera."""
+    """Return R_world_from_glcam, with a pinhole camera's axes right, up and back as columns."""
     return camera.T_world_from_cam[:3, :3] @ OPENCV_FROM_OPENGL
 
 
 def add_cameras(spec: mujoco.MjSpec, cameras: tuple[PinholeCamera, ...]) -> None:
-    """Add cameras to a scene that is being built, under their names."""
+    """Add cameras by name to a scene that is being built."""
     quaternion = np.zeros(4)
     for camera in cameras:
         mujoco.mju_mat2Quat(quaternion, glcam_axes(camera).ravel())

@@ -1,4 +1,4 @@
-"""Distribution of camera rigs, from which one is drawn for every episode."""
+"""Distribution of camera rigs, from which a rig is drawn for every episode."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,29 +19,30 @@ from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.rigs import RIGS, describe_poor_cameras
 
 TRIES = 100
-"""Largest number of draws of a camera until it sees the workspace."""
+"""Maximum number of draws of a camera until it sees the workspace."""
 STREAM = 0x10076
-"""Key of the random stream for rigs; those of a generator's `spawn` count from 0."""
+"""Key of the random stream for rigs, distinct from those of `Generator.spawn`, which count from
+0."""
 
 
 class CameraCounts(NamedTuple):
-    """Bounds on the number of cameras of an episode."""
+    """Bounds on the number of cameras in an episode."""
 
     fewest: int
-    """Least number of cameras."""
+    """Smallest number of cameras."""
     most: int
-    """Greatest number of cameras."""
+    """Largest number of cameras."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RigDistribution:
-    """Rigs around a nominal rig: poses, lenses and number of cameras are drawn in every episode.
+    """Distribution of rigs around a nominal rig, with random poses, lenses and number of cameras.
 
-    Estimators know the rig of their episode, as after a calibration; errors of a calibration are
-    faults ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera inside or behind an
-    obstacle, outside of the room, or with little of the workspace in its view is drawn again.
-    Levels without cameras draw none.
+    Estimators know the rig of their episode, as after a calibration; calibration errors are faults
+    ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera that is inside or behind an
+    obstacle, outside of the room, or sees too little of the workspace is drawn again. At perception
+    levels without cameras, no rig is drawn.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {
@@ -53,18 +54,20 @@ class RigDistribution:
     """Present names of fields that were renamed, by their old names."""
 
     nominal: str | tuple[CameraConfig, ...] = ()
-    """Nominal rig: its name ("lab_gopro") or its cameras; empty for the scene's own."""
+    """Nominal rig, given by its name ("lab_gopro") or its cameras; empty for the rig of the
+    scene."""
     max_shift_m: float = 0.0
-    """Largest shift of each camera from its nominal place along each axis [m]."""
+    """Largest shift of each camera from its nominal position along each axis [m]."""
     max_rotation_rad: float = 0.0
     """Largest rotation of each camera about any axis [rad]."""
     max_focal_change: float = 0.0
-    """Largest share by which a focal length is longer or shorter."""
+    """Largest fraction by which a focal length is longer or shorter."""
     lenses: tuple[Lens, ...] = ()
-    """Lenses of which each camera has one; empty for the nominal lenses."""
+    """Lenses from which that of each camera is drawn; empty for the nominal lenses."""
     n_cameras: int | tuple[int, int] | None = None
-    """Number of cameras, or (fewest, most) between which it is drawn; None for all. The cameras are
-    drawn, too; images of the others (`observe_images`) are black."""
+    """Number of cameras, or its bounds (fewest, most), between which it is drawn; None for all
+    cameras. The cameras in use are also drawn; images of the others (`observe_images`) are
+    black."""
 
     def __post_init__(self) -> None:
         if isinstance(self.nominal, str) and self.nominal not in RIGS:
@@ -84,7 +87,7 @@ class RigDistribution:
                 )
 
     def possible(self, rig: Sequence[CameraConfig]) -> list[CameraConfig]:
-        """Return every camera of the nominal rig with every lens that it may have."""
+        """Return all combinations of cameras of a rig and lenses that they may have."""
         return [replace(each, lens=lens) for each in rig for lens in self.lenses or (each.lens,)]
 
     @property
@@ -94,11 +97,11 @@ class RigDistribution:
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """The nominal rig; empty for the scene's own."""
+        """The nominal rig; empty for the rig of the scene."""
         return RIGS[self.nominal] if isinstance(self.nominal, str) else self.nominal
 
     def counts(self, n_cameras: int) -> CameraCounts:
-        """Return the fewest and the most cameras of an episode, for a rig of `n_cameras`."""
+        """Return the bounds on the number of cameras in an episode, for a rig of `n_cameras`."""
         if self.n_cameras is None:
             return CameraCounts(n_cameras, n_cameras)
         low, high = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
@@ -118,7 +121,7 @@ def draw_rig(
     Args:
         distribution: the distribution.
         scene: the scene with the nominal rig.
-        rng: generator of the episode.
+        rng: random generator of the episode.
 
     Raises:
         ConfigError: none of `TRIES` draws of a camera sees the workspace.
@@ -127,20 +130,20 @@ def draw_rig(
     fewest, most = distribution.counts(len(rig))
     n = int(rng.integers(fewest, most + 1))
     used = sorted(rng.permutation(len(rig))[:n].tolist())
-    streams = children(rng, len(rig))  # a camera's draws depend on its place in the rig only
+    streams = children(rng, len(rig))  # a camera's draws depend only on its index in the rig
     return tuple(_draw_camera(distribution, scene, rig[c], streams[c]) for c in used)
 
 
 def _draw_camera(
     distribution: RigDistribution, scene: Scene, camera: CameraConfig, rng: np.random.Generator
 ) -> CameraConfig:
-    """Draw a camera until it is in the room and sees the workspace.
+    """Draw a camera repeatedly until it is in the room and sees the workspace.
 
     Args:
         distribution: the distribution.
         scene: the scene with the nominal rig.
         camera: the nominal camera.
-        rng: generator of this camera.
+        rng: random generator of this camera.
     """
     refused = ""
     for _ in range(TRIES):
@@ -167,7 +170,7 @@ def _draw_camera(
 
 
 def _move(camera: CameraConfig, by_m: Floats, turn_rad: Floats, focal: float) -> CameraConfig:
-    """Return a camera at another pose with another focal length.
+    """Return a camera with another pose and focal length.
 
     Args:
         camera: the nominal camera.

@@ -1,4 +1,4 @@
-"""Rigs by name, and the coverage of the workspace by a rig."""
+"""Named rigs, and the coverage of the workspace by a rig."""
 
 import math
 from dataclasses import replace
@@ -32,25 +32,25 @@ RIGS: dict[str, tuple[CameraConfig, ...]] = {
 }
 """Rigs by their names in `cameras=`: those of the scenes, and the lab's with the paper's lens."""
 POOR_SHARE = 0.1
-"""Share of the workspace in a camera's view below which its place is poor."""
+"""Fraction of the workspace in a camera's view below which its pose counts as poor."""
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
-"""Heights of points of a body above the floor [m]."""
+"""Heights above the floor at which the visibility of a body is tested [m]."""
 SPACING_M = 0.5
-"""Distance of neighbouring points of the workspace [m]."""
+"""Spacing of points in the workspace [m]."""
 PIECE_M = 0.25
-"""Side of a piece of floor [m]."""
+"""Side length of a patch of floor [m]."""
 ASIDE_M = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2))
-"""Middle and sides of a body, from its axis [m]."""
+"""Horizontal offsets from a body's axis at which its visibility is tested, x and y [m]."""
 LEAST_SEEN = 3
-"""Number of visible heights from which on a camera detects a person."""
+"""Minimum number of visible heights for which a camera detects a person."""
 FAR_M = 8.0
-"""Range within which views are compared [m]."""
+"""Distance from a camera within which views are compared [m]."""
 VIEW_POINTS = 12
-"""Number of points along each axis of a view that are compared."""
+"""Number of points along each axis of a view for the comparison of views."""
 
 
 def sample_floor(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
-    """Return points (N, 3) on the walkable floor [m], without those in the robot or obstacles."""
+    """Return points (N, 3) on the walkable floor [m], except those in the robot or in obstacles."""
     points = sample_workspace(grounds, spacing_m)
     points = points[points[:, 2] == HEIGHTS_M[0]] * (1.0, 1.0, 0.0)
     from_robot_m = np.linalg.norm(points[:, :2] - grounds.robot_xy_m, axis=-1)
@@ -58,19 +58,19 @@ def sample_floor(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
 
 
 def coverage(scene: Scene) -> Coverage:
-    """Return the cameras of a scene's rig that would detect people on each piece of its floor."""
+    """Determine the cameras in a scene that would detect people on each patch of its floor."""
     return coverage_of(scene.cameras, scene.obstacles, sample_floor(scene.grounds, PIECE_M))
 
 
 def coverage_of(
     cameras: tuple[PinholeCamera, ...], still: Floats, floor_world: Points3
 ) -> Coverage:
-    """Return the cameras that would detect people on each piece of floor.
+    """Determine the cameras that would detect people on each patch of floor.
 
     Args:
         cameras: the cameras.
         still: (G, `shapes.WIDTH`) obstacles.
-        floor_world: (N, 3) centres of the pieces of floor, about `PIECE_M` apart [m].
+        floor_world: (N, 3) centres of the patches of floor, about `PIECE_M` apart [m].
     """
     body = [(*aside, z) for z in HEIGHTS_M for aside in ASIDE_M]
     points = (floor_world[:, None] + body).reshape(-1, 3)
@@ -81,9 +81,9 @@ def coverage_of(
 
 
 def common_views(cameras: tuple[PinholeCamera, ...]) -> Coverage:
-    """Return the sets of two or more cameras with views that overlap within `FAR_M`.
+    """Determine the sets of two or more cameras with overlapping views within `FAR_M`.
 
-    The result has no pieces of floor, and one empty set if no views overlap.
+    The result contains no patches of floor, and contains one empty set if no views overlap.
     """
     share = (np.arange(VIEW_POINTS) + 0.5) / VIEW_POINTS
     points = []
@@ -100,7 +100,7 @@ def common_views(cameras: tuple[PinholeCamera, ...]) -> Coverage:
 
 
 def sample_workspace(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
-    """Return points (P, 3) of the walkable area, from ankles to heads [m]."""
+    """Return points (P, 3) above the walkable area, between the heights of ankles and heads [m]."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
     n_x, n_y = (max(2, round((b - a) / spacing_m)) for a, b in ((x0, x1), (y0, y1)))
     grid = np.meshgrid(np.linspace(x0, x1, n_x), np.linspace(y0, y1, n_y), HEIGHTS_M)
@@ -108,12 +108,12 @@ def sample_workspace(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
 
 
 def find_visible(cameras: tuple[PinholeCamera, ...], still: Floats, points_world: Points3) -> Bools:
-    """Return (C, P) whether each point is in the image of each camera and not occluded.
+    """Return a mask (C, P) of the points that are in each camera's image and not occluded.
 
     Args:
         cameras: the cameras.
         still: (G, `shapes.WIDTH`) obstacles.
-        points_world: (P, 3) the points [m].
+        points_world: (P, 3) points [m].
     """
     eyes_world = np.stack([camera.eye_world for camera in cameras])
     seen = ~find_hidden(replace(no_surroundings(1), still=still), eyes_world, points_world[None])[0]
@@ -124,12 +124,12 @@ def find_visible(cameras: tuple[PinholeCamera, ...], still: Floats, points_world
 
 
 def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = None) -> list[str]:
-    """Return a sentence for each defect of a scene's rig; a good one, as its own, has none.
+    """Return a sentence for each defect of a scene's rig; the default rig of a scene has none.
 
     Args:
         scene: the scene with the rig.
-        wants_pairs: name of the estimator if it needs two cameras, else "".
-        fewest: least number of cameras of an episode if it is drawn; None for the rig's.
+        wants_pairs: name of the estimator if it needs two cameras; otherwise "".
+        fewest: smallest number of cameras in an episode if it is drawn; None for that of the rig.
     """
     if fewest == 1 and len(scene.cameras) > 1 and wants_pairs:
         return [
@@ -149,7 +149,7 @@ def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = N
 
 
 def _describe_one_camera(wants_pairs: str) -> str:
-    """Return a sentence about an estimator with one camera."""
+    """Return a sentence about the behaviour of an estimator with only one camera."""
     if not wants_pairs:
         return "How far people are follows from their bodies' usual size."
     return (
@@ -160,7 +160,7 @@ def _describe_one_camera(wants_pairs: str) -> str:
 
 
 def describe_poor_cameras(scene: Scene) -> list[str]:
-    """Return a sentence for each camera in an obstacle or with hardly any view of the workspace."""
+    """Return a sentence for each camera that is in an obstacle or sees too little workspace."""
     sentences: list[str] = []
     for camera, share in zip(scene.cameras, _visible_shares(scene), strict=True):
         inside = _is_inside_obstacle(camera, scene.obstacles)
@@ -176,7 +176,7 @@ def describe_poor_cameras(scene: Scene) -> list[str]:
 
 
 def _visible_shares(scene: Scene) -> Floats:
-    """Return (C,) the share of the workspace in the view of each camera."""
+    """Return the fraction (C,) of the workspace that each camera sees."""
     seen = find_visible(scene.cameras, scene.obstacles, sample_workspace(scene.grounds))
     return np.asarray(seen.mean(1))
 
@@ -184,7 +184,7 @@ def _visible_shares(scene: Scene) -> Floats:
 def _is_inside_obstacle(camera: PinholeCamera, still: Floats) -> bool:
     """Return whether a camera is inside a box, below the floor, or behind a wall.
 
-    Planes are floors and walls; behind a wall counts up to its height.
+    Planes are floors and walls; a camera is behind a wall only up to the height of the wall.
 
     Args:
         camera: the camera.

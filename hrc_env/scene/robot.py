@@ -1,9 +1,10 @@
-"""Robots: an MJCF file and a record of the names in it.
+"""Robots, each of which consists of an MJCF file and a record of the names in it.
 
-A robot's file has the middle of its foot at the origin, faces +x, and has two servos for each joint
-on one command [rad/s]: first all that hold its integral (`intvelocity`), then all that follow it
-(`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1. An angle [rad] of a hinge
-is a displacement [m] of a slide, here and everywhere.
+In its file, a robot has the centre of its base at the origin, faces +x, and has two servos for each
+joint with a common command [rad/s]: first the servos of all joints that hold the integral of the
+command (`intvelocity`), then those that follow it (`velocity`). One servo alone results in a tool
+error of 3-20 mm instead of 0.1 mm. Throughout the package, values in [rad] for a hinge are in [m]
+for a slide.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,40 +43,43 @@ DEFAULT = "ur10e_like"
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A gripper at the end of an arm; its joints and motor follow those of the arm in the MJCF."""
+    """A gripper at the end of an arm; in the MJCF, its joints and motor follow the arm's."""
 
     joints: tuple[str, ...]
-    """Slides of the fingers; 0 is closed, and all open by the same distance."""
+    """Slides of the fingers; at 0 the gripper is closed, and all fingers open by the same
+    distance."""
     pads: tuple[str, ...]
     """Geoms that touch a gripped object."""
     motor: str
-    """The `position` actuator that commands the distance of each finger from the middle [m]."""
+    """Name of the `position` actuator that commands the distance of each finger from the centre
+    [m]."""
     spans: tuple[str, ...]
-    """Those of the robot's capsules that enclose the fingers in any position, for distances and
-    occlusion; they collide with people only."""
+    """Capsules of the robot that enclose the fingers in any position, for distances and occlusion;
+    they collide only with people."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Suction:
-    """Suction cups at the end of an arm: objects stick to them until they are torn off."""
+    """Suction cups at the end of an arm, which hold objects until released or torn off."""
 
     site: str
-    """Site at the middle of the cups, z away from the arm; objects have sites of that pose."""
+    """Site at the centre of the cups with z pointing away from the arm; objects have matching
+    sites."""
     gauge: str
-    """The `force` sensor of the load on the cups."""
+    """Name of the `force` sensor that measures the load on the cups."""
     limit_n: float
-    """Load above which the cups let go [N]."""
+    """Load above which an object is torn off [N]."""
     pads: tuple[str, ...]
     """Geoms that touch an object."""
     spans: tuple[str, ...]
-    """Those of the robot's capsules that enclose the cups; they collide with people only."""
+    """Capsules of the robot that enclose the cups; they collide only with people."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A serial arm, or a mobile base; names are those of its MJCF."""
+    """A serial arm or a mobile base; all names refer to elements of its MJCF."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "watched": "watched_capsules",
@@ -88,31 +92,31 @@ class Robot:
     mjcf: str | Path
     """Path of the MJCF file, or its text."""
     joints: tuple[str, ...]
-    """The N hinges and slides, from the foot to the tool."""
+    """The N hinges and slides, in order from the base to the tool."""
     capsules: tuple[str, ...]
     """Capsule geoms that represent the surface in contacts, distances and occlusion."""
     watched_capsules: tuple[str, ...]
-    """Capsules with far ends that workers watch."""
+    """Capsules with distal ends that workers watch."""
     tool_site: str
     """Site at the tool point."""
     home_q: tuple[float, ...]
-    """Home pose, one angle a joint [rad]."""
+    """Home pose, with one angle for each joint [rad]."""
     spread_rad: tuple[float, ...]
-    """Largest distance of each joint from `home_q` at a reset [rad]."""
+    """Largest deviation of each joint from `home_q` at a reset [rad]."""
     never_touch: tuple[tuple[str, str], ...] = ()
-    """Pairs (capsule, geom of a scene) that are close in every pose and never touch."""
+    """Pairs (capsule, geom of a scene) without collisions, because they are close in every pose."""
     hand: Hand | None = None
-    """The gripper; None for a robot without."""
+    """The gripper; None for a robot without a gripper."""
     suction: Suction | None = None
-    """The suction cups; None for a robot without."""
+    """The suction cups; None for a robot without suction cups."""
     drives: bool = False
-    """Whether the robot drives on the floor, with its foot at the world's origin; else its foot is
-    on the scene's pedestal."""
+    """Whether the robot drives on the floor, with its base frame at the world's origin; otherwise
+    its base is on the scene's pedestal."""
     base_radius_m: float = 0.0
-    """Radius of a mobile base round the far ends of `watched_capsules` [m]; people keep clear of
-    all of it, from the floor upwards."""
+    """Radius of a mobile base around the distal ends of `watched_capsules` [m]; people keep away
+    from this cylinder above the floor."""
     slew: tuple[float, ...] = ()
-    """Limit on the change of each joint's commanded velocity [rad/s^2]; empty for
+    """Limit on the rate of change of each joint's commanded velocity [rad/s^2]; empty for
     `SceneConfig.slew_rad_s2` at every joint."""
 
     @property
@@ -138,22 +142,22 @@ class Robot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grip:
-    """Columns and motor of a hand in a compiled scene."""
+    """Indices and motor of a hand in a compiled scene."""
 
     fingers: Ints
-    """Columns of the fingers in `qpos` and `qvel`."""
+    """Indices of the fingers in `qpos` and `qvel`."""
     open_m: float
-    """Greatest distance of each finger from the middle [m]."""
+    """Maximum distance of each finger from the centre [m]."""
     stiffness_n_m: float
     """Stiffness of the motor [N/m]."""
     damping_n_s_m: float
     """Damping of the motor [N s/m]."""
     most_n: float
-    """Greatest force of the motor [N]."""
+    """Maximum force of the motor [N]."""
 
 
 def _read_robot(path: Path) -> Robot:
-    """Return a robot of the package, whose record is in a TOML file beside its MJCF."""
+    """Read a built-in robot from the TOML file beside its MJCF."""
     names = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
     return from_mapping(Robot, read_toml(path) | names)
 
@@ -162,19 +166,19 @@ ROBOTS: Registry[Robot] = Registry(
     "robot",
     {path.stem: _read_robot(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))},
 )
-"""Robots by name: those in `assets/robots`, and the registered ones."""
+"""Robots by name: those in `assets/robots`, and registered ones."""
 BUILT_IN = frozenset(ROBOTS.data.values())
-"""Robots in `assets/robots`; none of their capsules reaches out of the visual geoms by `BARE_M`."""
+"""Robots in `assets/robots`, with no capsule that extends beyond the visual geoms by `BARE_M`."""
 
 
 def find_robot(robot: str | Robot | Mapping[str, Any]) -> Robot:
-    """Return a robot.
+    """Return a robot, given its name or definition.
 
     Args:
-        robot: its name, or itself, as a record or a mapping of its fields.
+        robot: name of the robot, or the robot itself as a record or a mapping of its fields.
 
     Raises:
-        ConfigError: there is no such name, or a part of the robot is missing or wrong.
+        ConfigError: the name is unknown, or a part of the robot is missing or invalid.
     """
     if isinstance(robot, str):
         check_names("robot", [robot], ROBOTS)
@@ -194,9 +198,9 @@ def add_robot(spec: mujoco.MjSpec, robot: Robot, mount_world: Sequence[float]) -
     """Add a robot to a scene that is being built.
 
     Args:
-        spec: the scene.
+        spec: specification of the scene.
         robot: the robot.
-        mount_world: place of its foot [m].
+        mount_world: position of the robot's base [m].
     """
     child, hand = parse_mjcf(robot), robot.hand or robot.suction
     pads, spans = (hand.pads, hand.spans) if hand else ((), ())
@@ -216,7 +220,7 @@ def add_robot(spec: mujoco.MjSpec, robot: Robot, mount_world: Sequence[float]) -
 
 
 def servo_lead_s(robot: Robot, model: mujoco.MjModel) -> Floats:
-    """Return (N,) the lead of the rate servos [s]: inertia at the home pose over damping."""
+    """Return the lead times (N,) of the rate servos [s]: inertia at the home pose over damping."""
     data, n = mujoco.MjData(model), len(robot.joints)
     data.qpos[:n] = robot.home_q
     mujoco.mj_forward(model, data)
@@ -227,7 +231,7 @@ def servo_lead_s(robot: Robot, model: mujoco.MjModel) -> Floats:
 
 @lru_cache(maxsize=64)
 def check_robot(robot: Robot) -> None:
-    """Raise `ConfigError` for a missing or wrong part of a robot."""
+    """Raise `ConfigError` if a part of a robot is missing or invalid."""
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     if not isinstance(robot.name, str) or not robot.name.strip():
@@ -254,14 +258,14 @@ def check_robot(robot: Robot) -> None:
         )
     if robot.slew and min(robot.slew) <= 0:
         raise ConfigError(f"{robot.name}: slew must be positive [rad/s^2], got {robot.slew}.")
-    spec = parse_mjcf(robot)  # its bodies do not keep it alive
+    spec = parse_mjcf(robot)  # kept in a variable, because its bodies do not keep it alive
     for body in spec.bodies[1:]:
         if body.joints and not body.explicitinertial:
             raise ConfigError(f"{robot.name}: link {body.name!r} needs an <inertial>.")
 
 
 def find_grip(robot: Robot, model: mujoco.MjModel) -> Grip | None:
-    """Return the columns and the motor of a robot's hand in a scene; None if it has none."""
+    """Return indices and motor of a robot's hand in a scene; None if the robot has no hand."""
     if robot.hand is None:
         return None
     fingers = [model.joint(PREFIX + name).qposadr[0] for name in robot.hand.joints]

@@ -1,4 +1,4 @@
-"""Read a robot's links, joints, servos and capsules from its MJCF."""
+"""Reading of a robot's links, joints, servos and capsules from its MJCF."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -21,10 +21,10 @@ def make_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> Seria
 
     Args:
         robot: the robot.
-        mount_world: place of its foot [m].
+        mount_world: position of the robot's base [m].
 
     Raises:
-        ConfigError: a part that `Robot` names is missing in the MJCF or of another kind.
+        ConfigError: an element that `Robot` names is missing in the MJCF or has a wrong type.
     """
     try:
         return _read_chain(robot, mount_world)
@@ -35,7 +35,7 @@ def make_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> Seria
 
 
 def capsule_reach_m(chain: SerialChain) -> Floats:
-    """Return (K,) an upper bound on the distance of each capsule from the robot's foot [m]."""
+    """Return upper bounds (K,) on the distances of the capsules from the robot's base [m]."""
     strokes = np.where(chain.slides, np.abs(chain.range_rad).max(-1), 0.0)
     to_link = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1) + strokes)
     on_link = np.linalg.norm(chain.capsule_ends, axis=-1).max(-1)
@@ -48,9 +48,9 @@ class LinkCapsules(NamedTuple):
     link: Ints
     """(K,) index of the link that carries each capsule."""
     ends: Floats
-    """(K, 2, 3) end points of its axis in the frame of the link [m]."""
+    """(K, 2, 3) end points of each capsule's axis in the frame of its link [m]."""
     radius_m: Floats
-    """(K,) radius [m]."""
+    """(K,) radius of each capsule [m]."""
 
 
 def parse_mjcf(robot: "Robot") -> mujoco.MjSpec:
@@ -61,7 +61,7 @@ def parse_mjcf(robot: "Robot") -> mujoco.MjSpec:
 
 
 def _read_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
-    """Return the kinematic chain of a robot, or raise `ConfigError` without the robot's name."""
+    """Return the kinematic chain of a robot; errors do not contain the robot's name."""
     model, n = parse_mjcf(robot).compile(), len(robot.joints)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)  # all joints at 0
@@ -91,7 +91,7 @@ def _read_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> Seri
 
 
 def find_id(model: mujoco.MjModel, kind: str, name: str) -> int:
-    """Return the id of a named element of a kind, or raise `ConfigError` if it is missing."""
+    """Return the ID of a named element of a type, or raise `ConfigError` if it is missing."""
     number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
     if number < 0:
         raise ConfigError(f"its MJCF has no {kind} {name!r}.")
@@ -99,15 +99,15 @@ def find_id(model: mujoco.MjModel, kind: str, name: str) -> int:
 
 
 def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None") -> None:
-    """Raise `ConfigError` unless joints and servos have the kinds and the order of a robot.
+    """Raise `ConfigError` if joints and servos do not have the required types and order.
 
-    The joints are hinges and slides with ranges, then the hand's slides; the actuators are the
-    joints' servos, then the hand's motor.
+    The joints must be hinges and slides with ranges, followed by the hand's slides; the actuators
+    must be the joints' servos, followed by the hand's motor.
 
     Args:
         model: the compiled MJCF.
-        joints: ids of the robot's joints.
-        hand: the robot's hand; None if it has none.
+        joints: IDs of the robot's joints.
+        hand: the robot's hand; None if the robot has none.
     """
     n, fingers = (
         len(joints),
@@ -136,21 +136,21 @@ def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None")
 
 
 def find_link(model: mujoco.MjModel, bodies: list[int], body: int) -> int:
-    """Return the index of the link among `bodies` that carries a body; -1 if none does."""
+    """Return the index in `bodies` of the link that carries a body; -1 if there is none."""
     while body and body not in bodies:
         body = model.body_parentid[body]
     return bodies.index(body) if body in bodies else -1
 
 
 def _pose(pos: Sequence[float] | Floats, rotation: Floats) -> Transforms:
-    """Return the transform (4, 4) of a position (3,) and a rotation of 9 numbers."""
+    """Return the transform (4, 4) for a position (3,) and a rotation matrix of 9 entries."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation.reshape(3, 3), pos
     return T
 
 
 def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Transforms:
-    """Return the frame (4, 4) of a joint in the world; its z axis is the joint's axis."""
+    """Return the frame (4, 4) of a joint in the world, with the joint's axis along z."""
     quaternion, turn = np.zeros(4), np.zeros(9)
     mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
     mujoco.mju_quat2Mat(turn, quaternion)
@@ -165,7 +165,7 @@ def _read_capsules(
 
     Args:
         model: the compiled MJCF.
-        data: its state with all joints at 0.
+        data: state of the model with all joints at 0.
         bodies: bodies of the links.
         links: (N, 4, 4) frames of the links in the world.
         robot: the robot.

@@ -1,12 +1,12 @@
-"""Import a `Robot` from any MJCF of an arm, whatever its servos, visual and collision geoms are.
+"""Import of a `Robot` from the MJCF of any arm, with any servos, visual and collision geoms.
 
 robot = robot_from_mjcf("ur5e/robot.xml", home_q=(0, -1.6, 1.9, -1.9, -1.6, 0))
 env = gymnasium.make("HRCReach-v0", robot=robot)
 
-Its actuators are replaced by two servos a joint on one velocity command (`scene.robot`), with gains
-by the inertia that each moves; gravity is compensated, as robot controllers do. Visual geoms are
-kept; collision geoms are removed from links that have visual ones, and capsules are fitted to the
-geoms of each link.
+The actuators are replaced by two servos per joint with a common velocity command (`scene.robot`),
+and with gains proportional to the inertia that the joint moves; gravity is compensated, as by robot
+controllers. Visual geoms are kept, collision geoms are removed from links that have visual ones,
+and capsules are fitted to the remaining geoms of each link.
 """
 
 from collections import Counter
@@ -27,19 +27,20 @@ from hrc_env.scene.robot import Robot
 from hrc_env.scene.robot_looks import sample_surface
 
 DAMPING_1_S = 100.0
-"""Damping of the rate servos per inertia [1/s]."""
+"""Damping of the rate servos per unit of inertia [1/s]."""
 STIFFNESS_1_S2 = 1600.0
-"""Stiffness of the holding servos per inertia [1/s^2]: an eigenfrequency of 40 rad/s, more than
-critically damped."""
+"""Stiffness of the holding servos per unit of inertia [1/s^2], for an overdamped natural frequency
+of 40 rad/s."""
 POSES = 64
-"""Number of poses over which the greatest inertia of each joint is determined."""
+"""Number of random poses over which the maximum inertia of each joint is determined."""
 LEAST_ARMATURE = 0.1
-"""Least armature of a joint as a share of that inertia, so that light joints do not jump."""
+"""Minimum armature of a joint as a fraction of its maximum inertia, for the stability of light
+joints."""
 TURN = 2 * np.pi
-"""Range of a joint without limits, to both sides [rad]."""
+"""Range in both directions of a joint without limits [rad]."""
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
-"""MuJoCo's kinds of joints."""
+"""MuJoCo's types of joints."""
 
 
 class Chain(NamedTuple):
@@ -48,7 +49,7 @@ class Chain(NamedTuple):
     joints: list[str]
     """Names of the joints."""
     links: list[str]
-    """Names of the bodies that they move."""
+    """Names of the bodies that the joints move."""
 
 
 def robot_from_mjcf(
@@ -60,20 +61,21 @@ def robot_from_mjcf(
     fastest_rad_s: Sequence[float] | float = 2.0,
     tool_site: str = "",
 ) -> Robot:
-    """Return a robot from the MJCF of an arm.
+    """Make a robot from the MJCF of an arm.
 
     Args:
         mjcf: path of the file, or its text.
         name: name of the robot in `robot=`; "" for the name of the model.
-        home_q: home pose, one angle a joint [rad]; () for the first keyframe, or the middle of the
-            joints' ranges.
-        spread_rad: largest distance of each joint from `home_q` at a reset [rad].
-        fastest_rad_s: greatest speed of each joint [rad/s], of slides [m/s].
-        tool_site: site at the tool point; "" for the last one on the last link, or that link's
-            origin.
+        home_q: home pose, with one angle for each joint [rad]; () for the first keyframe or, if
+            there is none, the centres of the joints' ranges.
+        spread_rad: largest deviation of each joint from `home_q` at a reset [rad].
+        fastest_rad_s: maximum speed of each joint [rad/s], or [m/s] for slides.
+        tool_site: site at the tool point; "" for the last site on the last link or, if there is
+            none, the link's origin.
 
     Raises:
-        ConfigError: the MJCF cannot be read, or is not of one serial arm of hinges and slides.
+        ConfigError: the MJCF cannot be read, or does not describe a single serial arm of hinges and
+            slides.
     """
     check_kind("mjcf", mjcf, str, Path)
     spec = _read(mjcf)
@@ -106,7 +108,7 @@ def robot_from_mjcf(
 
 
 def _read(mjcf: str | Path) -> mujoco.MjSpec:
-    """Return the specification of an MJCF, or raise `ConfigError` if it cannot be read."""
+    """Read an MJCF as a specification, or raise `ConfigError` if this fails."""
     is_text = isinstance(mjcf, str) and mjcf.lstrip().startswith("<")
     try:
         if is_text:
@@ -118,7 +120,7 @@ def _read(mjcf: str | Path) -> mujoco.MjSpec:
 
 
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Return the compiled model of a specification, or raise `ConfigError`."""
+    """Compile a specification, or raise `ConfigError` if this fails."""
     try:
         return spec.compile()
     except ValueError as error:
@@ -126,14 +128,14 @@ def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def _describe_joints(model: mujoco.MjModel) -> str:
-    """Return the numbers of joints of each kind in words, such as "6 hinge joints"."""
+    """Return the number of joints of each type as text, such as "6 hinge joints"."""
     names = {FREE: "free", BALL: "ball", HINGE: "hinge", SLIDE: "slide"}
     counts = Counter(names[int(kind)] for kind in model.jnt_type)
     return ", ".join(f"{n} {name} joint{'s' * (n > 1)}" for name, n in counts.items()) or "no joint"
 
 
 def _find_chain(model: mujoco.MjModel, name: str) -> Chain:
-    """Return the names of a serial chain, or raise `ConfigError` if the joints are not one."""
+    """Return the names of the serial chain, or raise `ConfigError` if the joints form none."""
     kinds = {int(kind) for kind in model.jnt_type}
     if not model.njnt or not kinds <= {HINGE, SLIDE}:
         raise ConfigError(
@@ -159,7 +161,7 @@ def _find_chain(model: mujoco.MjModel, name: str) -> Chain:
 
 
 def _one_a_joint(name: str, value: Sequence[float] | float, n: int) -> tuple[float, ...]:
-    """Return an argument as one value for each of n joints, or raise `ConfigError`."""
+    """Return an argument as one value per joint, or raise `ConfigError` for a wrong number."""
     values = (float(value),) * n if isinstance(value, int | float) else tuple(value)
     if len(values) != n:
         raise ConfigError(f"{name} must be one number, or one of each of {n} joints, got {value}.")
@@ -167,7 +169,7 @@ def _one_a_joint(name: str, value: Sequence[float] | float, n: int) -> tuple[flo
 
 
 def _find_home(model: mujoco.MjModel, n: int) -> tuple[float, ...]:
-    """Return the first keyframe of n joints, or else the middle of their ranges."""
+    """Return the first keyframe of n joints or, if there is none, the centres of their ranges."""
     if model.nkey:
         return tuple(model.key_qpos[0, :n].tolist())
     limited = model.jnt_limited[:n].astype(bool)
@@ -177,13 +179,13 @@ def _find_home(model: mujoco.MjModel, n: int) -> tuple[float, ...]:
 def _limit_spread(
     spread: tuple[float, ...], spec: mujoco.MjSpec, joints: list[str]
 ) -> tuple[float, ...]:
-    """Return the spread of each joint, at most the width of its range."""
+    """Return the spread of each joint, limited to the width of its range."""
     widths = (float(np.ptp(spec.joint(each).range)) for each in joints)
     return tuple(min(each, width) for each, width in zip(spread, widths, strict=True))
 
 
 def _keep_files(spec: mujoco.MjSpec) -> None:
-    """Make the paths of meshes and textures absolute, as the text of an MJCF has no folder."""
+    """Make the paths of meshes and textures absolute, because MJCF text has no folder."""
     folder = Path(spec.modelfiledir or ".")
     for parts, subfolder in ((spec.meshes, spec.meshdir), (spec.textures, spec.texturedir)):
         for part in parts:
@@ -193,7 +195,7 @@ def _keep_files(spec: mujoco.MjSpec) -> None:
 
 
 def _keep_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Make the inertia of links explicit, as geoms that determine it may be removed."""
+    """Make the inertia of links explicit, because geoms that determine it may be removed."""
     for body in spec.bodies[1:]:
         k = model.body(body.name).id if body.name else body.id
         body.mass = float(model.body_mass[k])
@@ -202,7 +204,7 @@ def _keep_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 
 
 def _drop_colliding(spec: mujoco.MjSpec) -> None:
-    """Delete the collision geoms of bodies with visual ones; the other geoms become visual."""
+    """Delete the collision geoms of bodies that have visual ones; all other geoms become visual."""
     for body in spec.bodies:
         geoms = list(body.geoms)
         visual = [geom for geom in geoms if not (geom.contype or geom.conaffinity)]
@@ -220,9 +222,9 @@ def _replace_servos(
 
     Args:
         spec: the specification, which is changed.
-        model: its compiled model.
+        model: compiled model of the specification.
         joints: names of the joints.
-        fastest: greatest speed of each joint [rad/s].
+        fastest: maximum speed of each joint [rad/s].
     """
     most_n = _forces(model)
     inertia = _inertia(model)
@@ -252,7 +254,7 @@ def _replace_servos(
 
 
 def _inertia(model: mujoco.MjModel) -> Floats:
-    """Return (N,) the greatest inertia that each joint moves, over seeded random poses."""
+    """Return the maximum inertia (N,) that each joint moves, over seeded random poses."""
     rng, data = np.random.default_rng(0), mujoco.MjData(model)
     limited = model.jnt_limited.astype(bool)[:, None]
     low, high = np.where(limited, model.jnt_range, [-TURN, TURN]).T
@@ -266,7 +268,7 @@ def _inertia(model: mujoco.MjModel) -> Floats:
 
 
 def _forces(model: mujoco.MjModel) -> Floats:
-    """Return (N,) the greatest torque or force of each joint [N m, N]; infinite if not given."""
+    """Return the maximum torque or force (N,) of each joint [N m, N]; infinite if unspecified."""
     most = np.full(model.njnt, np.inf)
     for k in range(model.nu):
         joint = int(model.actuator_trnid[k, 0])
@@ -283,9 +285,9 @@ def _find_tool(spec: mujoco.MjSpec, model: mujoco.MjModel, last: str, wanted: st
 
     Args:
         spec: the specification.
-        model: its compiled model.
+        model: compiled model of the specification.
         last: name of the last link.
-        wanted: name of the site; "" for the last one on that link.
+        wanted: name of the site; "" for the last site on the last link.
     """
     names = [site.name for site in spec.sites if site.name]
     if wanted and wanted not in names:
@@ -306,14 +308,14 @@ def _find_tool(spec: mujoco.MjSpec, model: mujoco.MjModel, last: str, wanted: st
 
 
 def _is_on(model: mujoco.MjModel, body: int, link: int) -> bool:
-    """Return whether a body is a link or is carried by it."""
+    """Return whether a body is a given link or is attached to it."""
     while body and body != link:
         body = int(model.body_parentid[body])
     return body == link
 
 
 def _add_capsules(spec: mujoco.MjSpec, links: list[str]) -> dict[str, list[str]]:
-    """Fit capsules to the geoms of each link and add them; return their names by link."""
+    """Fit capsules to the geoms of each link, add them, and return their names by link."""
     model = _compile(spec)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -1,7 +1,7 @@
 """Comparison of a robot's visual geoms with the capsules that represent it.
 
-Cameras see the visual geoms; distances, contacts and shields use the capsules. Points on both
-surfaces are compared in the home pose.
+Cameras see the visual geoms, whereas distances, contacts and shields use the capsules. Points on
+both surfaces are compared in the home pose.
 """
 
 import warnings
@@ -20,32 +20,33 @@ if TYPE_CHECKING:
     from hrc_env.scene.robot import Robot
 
 BARE_M = 0.1
-"""Distance of a capsule's surface from the visual geoms above which the capsule is drawn [m]."""
+"""Distance of a capsule's surface from the visual geoms above which the capsule is rendered [m]."""
 INSIDE_M = 0.005
-"""Depth in another capsule from which on points of a capsule are on no surface [m]."""
+"""Depth in another capsule beyond which a point on a capsule is not on the outer surface [m]."""
 UNLIKE_M = 0.05
-"""Difference of visual geoms and capsules that causes a warning [m]."""
+"""Difference between visual geoms and capsules above which a warning is issued [m]."""
 SPACING_M = 0.02
-"""Distance of neighbouring points on a surface [m]."""
+"""Spacing of points on a surface [m]."""
 MOST_POINTS = 4000
-"""Largest number of points on one mesh at that spacing."""
+"""Maximum number of random points on a mesh at the spacing `SPACING_M`."""
 
 
 class Mismatch(NamedTuple):
-    """Difference of a capsule and the visual geoms on the links around it."""
+    """Difference between a capsule and the visual geoms on neighbouring links."""
 
     bare_m: float
-    """Largest distance of the capsule's surface from all visual geoms [m]; infinite without any."""
+    """Largest distance of the capsule's surface from the nearest visual geom [m]; infinite if there
+    is none."""
     outside_m: float
-    """Largest distance of visual geoms of its link out of all capsules [m]."""
+    """Largest distance of visual geoms on the capsule's link from the nearest capsule [m]."""
 
 
 @lru_cache(maxsize=64)
 def bare_capsules(robot: "Robot") -> frozenset[str]:
-    """Return the capsules that are farther than `BARE_M` from all visual geoms around them.
+    """Return the names of capsules that extend farther than `BARE_M` from visual geoms.
 
-    These are drawn, so that cameras see the surface of which distances are measured. Capsules of
-    fingers and cups are never among them.
+    These capsules are rendered, so that cameras see the surface to which distances are measured.
+    Capsules of fingers and cups are never included.
     """
     hand = robot.hand or robot.suction
     spans = hand.spans if hand else ()
@@ -57,11 +58,11 @@ def bare_capsules(robot: "Robot") -> frozenset[str]:
 
 
 def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mismatch]:
-    """Compare each capsule with the visual geoms on its link and the next ones, in the home pose.
+    """Compare each capsule with the visual geoms on its own and adjacent links, in the home pose.
 
     Args:
         robot: the robot.
-        spacing_m: distance of neighbouring points on a surface [m].
+        spacing_m: spacing of points on a surface [m].
     """
     model = parse_mjcf(robot).compile()
     data, hand = mujoco.MjData(model), robot.hand or robot.suction
@@ -94,7 +95,7 @@ def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mis
 
 
 def warn_of_mismatch(robot: "Robot") -> None:
-    """Warn if visual geoms and capsules of a robot differ by more than `UNLIKE_M`."""
+    """Issue a warning if visual geoms and capsules of a robot differ by more than `UNLIKE_M`."""
     drawn = bare_capsules(robot)
     for name, mismatch in compare_looks(robot).items():
         if name not in drawn and mismatch.bare_m > UNLIKE_M:
@@ -116,13 +117,13 @@ def warn_of_mismatch(robot: "Robot") -> None:
 def sample_surface(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, spacing_m: float = SPACING_M
 ) -> Points3:
-    """Return points (N, 3) on the surface of a geom in the world [m].
+    """Sample points (N, 3) on the surface of a geom in the world [m].
 
     Args:
         model: the model.
-        data: its state.
-        geom: the geom.
-        spacing_m: distance of neighbouring points [m].
+        data: state of the model.
+        geom: index of the geom.
+        spacing_m: spacing of the points [m].
     """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
@@ -133,30 +134,30 @@ def sample_surface(
 
 
 class Solid(NamedTuple):
-    """A geom in its pose, which can be tested for points inside."""
+    """A geom in its pose, for tests of whether points are inside."""
 
     kind: int
-    """MuJoCo's kind of the geom."""
+    """MuJoCo's type of the geom."""
     size: Floats
     """(3,) MuJoCo's sizes of the geom [m]."""
     position_world: Points3
-    """(3,) middle of the geom [m]."""
+    """(3,) centre of the geom [m]."""
     rotation: Floats
-    """(3, 3) world_from_geom."""
+    """(3, 3) rotation world_from_geom."""
     bounding_radius_m: float
-    """Radius of a sphere round the middle that contains the geom [m]."""
+    """Radius of a sphere around the centre that contains the geom [m]."""
     sides: Floats
-    """(F, 4) sides of a mesh's convex hull; empty for other kinds."""
+    """(F, 4) half-spaces of a mesh's convex hull; empty for other types."""
 
     def contains(self, points_world: Points3) -> Bools:
-        """Return (N,) whether points (N, 3) are inside; of a mesh, inside of its convex hull."""
+        """Return a mask (N,) of the points (N, 3) inside; for a mesh, inside its convex hull."""
         off = points_world - self.position_world
         inside = np.linalg.norm(off, axis=-1) < self.bounding_radius_m
         inside[inside] = self._contains(off[inside] @ self.rotation)
         return inside
 
     def _contains(self, local: Points3) -> Bools:
-        """Return (N,) whether points (N, 3) in the frame of the geom are inside."""
+        """Return a mask (N,) of the points (N, 3) inside the geom, in the frame of the geom."""
         flat, height, size = np.hypot(*local[:, :2].T), np.abs(local[:, 2]), self.size
         inside = {
             mujoco.mjtGeom.mjGEOM_MESH: lambda: _are_inside(self.sides, local),
@@ -173,7 +174,7 @@ class Solid(NamedTuple):
 
 
 def make_solid(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
-    """Return a geom in its pose in the world."""
+    """Return a geom in its pose in the world as a `Solid`."""
     kind, sides = int(model.geom_type[geom]), np.zeros((0, 4))
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
         corners = _triangles(model, int(model.geom_dataid[geom]))
@@ -189,10 +190,10 @@ def make_solid(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
 
 
 def _sides_of_hull(points_m: Points3) -> Floats:
-    """Return (F, 4) the sides of the convex hull of points (N, 3).
+    """Return the half-spaces (F, 4) of the convex hull of points (N, 3).
 
-    A side is its outward normal and minus its distance from the origin. For points in a plane there
-    is one side, with nothing inside.
+    A half-space is given by the outward normal and minus the distance from the origin. For coplanar
+    points, there is one half-space that contains no point.
     """
     try:
         return np.asarray(ConvexHull(points_m).equations, np.float64)
@@ -201,19 +202,19 @@ def _sides_of_hull(points_m: Points3) -> Floats:
 
 
 def _are_inside(sides: Floats, points_m: Points3) -> Bools:
-    """Return (M,) whether points (M, 3) are behind all sides (F, 4) of a hull."""
+    """Return a mask (M,) of the points (M, 3) that are in all half-spaces (F, 4) of a hull."""
     return np.asarray((points_m @ sides[:, :3].T + sides[:, 3] <= 0.0).all(-1))
 
 
 def distance_from_capsules_m(
     looks: Sequence[Points3], ends_world: Floats, radius_m: Floats
 ) -> float:
-    """Return the largest distance of points of visual geoms out of all capsules [m].
+    """Return the largest distance of visual geoms from the nearest capsule [m].
 
     Args:
-        looks: points (N, 3) of each visual geom [m].
+        looks: points (N, 3) on each visual geom [m].
         ends_world: (K, 2, 3) end points of the capsules' axes [m].
-        radius_m: (K,) their radii [m].
+        radius_m: (K,) radii of the capsules [m].
     """
     if not looks:
         return 0.0
@@ -221,7 +222,7 @@ def distance_from_capsules_m(
 
 
 def _outside_m(points_world: Points3, ends_world: Floats, radius_m: Floats) -> Floats:
-    """Return (N,) the distance of points (N, 3) out of the nearest of capsules (K, 2, 3) [m]."""
+    """Return the distance (N,) of points (N, 3) from the nearest of capsules (K, 2, 3) [m]."""
     if not len(ends_world):
         return np.full(len(points_world), np.inf)
     start, along = ends_world[:, 0], ends_world[:, 1] - ends_world[:, 0]
@@ -233,11 +234,11 @@ def _outside_m(points_world: Points3, ends_world: Floats, radius_m: Floats) -> F
 
 
 def distance_from_looks_m(capsule_points: Points3, looks: Sequence[Points3]) -> float:
-    """Return the largest distance of a capsule's surface from the visual geoms [m].
+    """Return the largest distance of a capsule's surface from the nearest visual geom [m].
 
     Args:
         capsule_points: (N, 3) points on the capsule's surface [m].
-        looks: points (M, 3) of each visual geom [m].
+        looks: points (M, 3) on each visual geom [m].
     """
     points_world = np.concatenate([np.zeros((0, 3)), *looks])
     if not len(points_world):
@@ -248,12 +249,12 @@ def distance_from_looks_m(capsule_points: Points3, looks: Sequence[Points3]) -> 
 
 
 def _grid(length_m: float, spacing_m: float) -> int:
-    """Return the number of points along a length."""
+    """Return the number of points along a length for a given spacing."""
     return int(np.clip(np.ceil(length_m / spacing_m), 1, 60 * SPACING_M / spacing_m)) + 1
 
 
 def _on_box(size: Floats, spacing_m: float) -> Points3:
-    """Return points (N, 3) on a box of half edges `size` (3,) [m]."""
+    """Sample points (N, 3) on a box with half edge lengths `size` (3,) [m]."""
     axes = [np.linspace(-half, half, _grid(2 * half, spacing_m)) for half in size]
     faces: list[Points3] = []
     for k in range(3):
@@ -264,13 +265,13 @@ def _on_box(size: Floats, spacing_m: float) -> Points3:
 
 
 def _on_round(radius_m: float, half_m: float, cap: Floats, spacing_m: float) -> Points3:
-    """Return points (N, 3) on a tube about z and on its ends.
+    """Sample points (N, 3) on a tube about z and on its caps.
 
     Args:
         radius_m: radius of the tube [m].
         half_m: half length of the tube [m].
-        cap: (n, 2) radius and height above the end of the rings of a cap [m].
-        spacing_m: distance of neighbouring points [m].
+        cap: (n, 2) radius and height above the tube's end of the n rings of a cap [m].
+        spacing_m: spacing of the points [m].
     """
     around = np.linspace(0, 2 * np.pi, _grid(2 * np.pi * radius_m, spacing_m), endpoint=False)
     tube = [(radius_m, z) for z in np.linspace(-half_m, half_m, _grid(2 * half_m, spacing_m))]
@@ -315,7 +316,7 @@ _ON_SHAPES: dict[int, Callable[[Floats, float], Points3]] = {
 
 
 def _on_mesh(model: mujoco.MjModel, mesh: int, spacing_m: float) -> Points3:
-    """Return points (N, 3) on a mesh: corners of its triangles, and more on large triangles [m]."""
+    """Sample points (N, 3) on a mesh [m]: vertices and, by area, random points on its triangles."""
     corners = _triangles(model, mesh)
     n = len(corners)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -331,7 +332,7 @@ def _on_mesh(model: mujoco.MjModel, mesh: int, spacing_m: float) -> Points3:
 
 
 def _triangles(model: mujoco.MjModel, mesh: int) -> Floats:
-    """Return (T, 3, 3) the corners of the triangles of a mesh [m]."""
+    """Return the vertices (T, 3, 3) of the triangles of a mesh [m]."""
     first, n = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     faces = model.mesh_vertadr[mesh] + model.mesh_face[first : first + n]
     return np.asarray(model.mesh_vert[faces], np.float64)

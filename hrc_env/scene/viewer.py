@@ -1,4 +1,4 @@
-"""MuJoCo's interactive window, for machines with a display."""
+"""Interactive window of MuJoCo, for machines with a display."""
 
 import copy
 from typing import Any
@@ -16,7 +16,7 @@ from hrc_env.scene.worker_visuals import show_workers
 class Viewer:
     """A window that shows one environment.
 
-    Drag to look round; when the window is closed, the environment runs on.
+    Drag the mouse to rotate the view. The environment continues to run after the window is closed.
 
     Args:
         scene: the scene.
@@ -26,13 +26,13 @@ class Viewer:
         """Open the window.
 
         Raises:
-            RenderingError: there is no display.
+            RenderingError: no display is available.
         """
         self._model = copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
         self._visuals = find_visuals(scene)
         try:
-            gl.require_display()  # without a display launch_passive waits for ever
+            gl.require_display()  # without a display, launch_passive never returns
             gl.load_triton_first()
             from mujoco import viewer
 
@@ -44,7 +44,7 @@ class Viewer:
             ) from error
 
     def show(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Pose the scene.
+        """Update the poses in the window.
 
         Args:
             q: (N,) joint angles of the robot [rad].

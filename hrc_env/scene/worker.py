@@ -1,8 +1,8 @@
-"""Add a baked worker to a MuJoCo model: mocap bodies with capsules.
+"""Addition of workers to a MuJoCo model, as mocap bodies with capsules.
 
-The worker is moved, not simulated: 22 mocap bodies take positions and rotations from
-`WorkerMotion`. Contacts are with the capsules, which no camera draws; cameras see the visual
-meshes of `worker_visuals`.
+A worker is moved kinematically: 22 mocap bodies take positions and rotations from `WorkerMotion`.
+Contacts are computed with the capsules, which are not rendered; cameras see the visual meshes of
+`worker_visuals`.
 """
 
 from functools import lru_cache
@@ -15,11 +15,11 @@ from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, add_capsule
 from hrc_env.worker.body import SEGMENTS, Body, load_body
 
 CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb")
-"""Fields of MuJoCo's model in which the capsules of two bodies differ."""
+"""Fields of MuJoCo's model in which the capsules of different bodies differ."""
 
 
 def add_worker(spec: mujoco.MjSpec, body: Body, prefix: str) -> None:
-    """Add a worker in its rest pose to a specification; its names begin with the prefix."""
+    """Add a worker in its rest pose to a specification; the prefix precedes all of its names."""
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)
@@ -39,18 +39,18 @@ def add_worker(spec: mujoco.MjSpec, body: Body, prefix: str) -> None:
 
 
 def mocap_ids(model: mujoco.MjModel, prefix: str) -> Ints:
-    """Return (22,) the rows of `data.mocap_pos` and `data.mocap_quat` of a worker's segments."""
+    """Return the indices (22,) of a worker's segments in `data.mocap_pos` and `data.mocap_quat`."""
     return np.array([model.body(prefix + name).mocapid[0] for name in SEGMENTS], dtype=np.int64)
 
 
 def capsule_geom_ids(model: mujoco.MjModel, body: Body, prefix: str) -> Ints:
-    """Return (K,) the geoms of a worker's capsules, in the order of `body.capsule_names`."""
+    """Return the geom indices (K,) of a worker's capsules, in the order of `body.capsule_names`."""
     return np.array([model.geom(prefix + name).id for name in body.capsule_names], dtype=np.int64)
 
 
 @lru_cache(maxsize=16)
 def capsule_shapes(bodies: tuple[str, ...]) -> dict[str, Floats]:
-    """Return the compiled capsules of N bodies: (N, K, ...) by the names of MuJoCo's fields."""
+    """Return the compiled capsules of N bodies as arrays (N, K, ...) by name of MuJoCo's field."""
     shapes: dict[str, list[Floats]] = {name: [] for name in CAPSULE_FIELDS}
     for name in bodies:
         spec = mujoco.MjSpec()

@@ -1,7 +1,7 @@
-"""Skins, hats and props of workers in the drawing model; the physics has their capsules only.
+"""Skins, hats and props of workers in the drawing model; the physics contains only capsules.
 
 All visual bodies of a worker are attached to the same 22 mocap bodies, which are followed by a
-mocap body for each prop. Bodies and props that are not in use are in a group that is not drawn.
+mocap body for each prop. Bodies and props that are not in use are in a group that is not rendered.
 """
 
 from dataclasses import dataclass
@@ -18,15 +18,15 @@ from hrc_env.worker.mesh import HatMesh, SkinMesh, WorkerMesh
 from hrc_env.worker.props import PROP_NAMES
 
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
-"""Material of skins and clothes."""
+"""Material properties of skins and clothes."""
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
-"""Material of hats."""
+"""Material properties of hats."""
 SHOWN = DECORATION
-"""Group of visual geoms that are drawn."""
+"""Group of visual geoms that are rendered."""
 HIDDEN = WORKER_CAPSULES
-"""Group of visual geoms that are not drawn."""
+"""Group of visual geoms that are not rendered."""
 PARKED_M = (0.0, 0.0, -30.0)
-"""Place of props that are not in use [m]."""
+"""Position of props that are not in use [m]."""
 LOAD = "load_"
 """Prefix of the names of bodies for props that lie on the floor."""
 
@@ -36,23 +36,23 @@ class WorkerVisuals:
     """Indices of the skins, hats and props of W workers in a drawing model."""
 
     segments: Ints
-    """(W, S) mocap row of every body segment."""
+    """(W, S) mocap index of every body segment."""
     skins: Ints
-    """(nskin, 2) index of the worker and of the body of each skin."""
+    """(nskin, 2) indices of the worker and the body of each skin."""
     hats: Ints
-    """(H, 3) index of the worker and of the body of each hat, and its geom."""
+    """(H, 3) indices of the worker, the body and the geom of each hat."""
     props: Ints
-    """(N, len(PROPS) - 1) mocap rows of the copies of each prop, in columns, which follow the
-    workers' rows; -1 where a prop has fewer copies."""
+    """(N, len(PROPS) - 1) mocap indices of the copies of each prop, with a column for each prop; -1
+    in unused rows. They follow those of the workers."""
 
 
 def add_visuals(spec: mujoco.MjSpec, body: Body, looks: WorkerMesh, prefix: str) -> None:
     """Add the skins and the hat of a body to a worker; workers with the same body share textures.
 
     Args:
-        spec: the scene, to which `add_worker` has added the worker.
+        spec: specification of the scene, to which `add_worker` has added the worker.
         body: the body.
-        looks: its meshes.
+        looks: meshes of the body.
         prefix: prefix of the worker's names.
     """
     for skin in looks.skins:
@@ -62,12 +62,12 @@ def add_visuals(spec: mujoco.MjSpec, body: Body, looks: WorkerMesh, prefix: str)
 
 
 def add_props(spec: mujoco.MjSpec, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> None:
-    """Add every prop once for each worker, and the loads that lie on the floor, all parked.
+    """Add a copy of every prop for each worker, and the loads on the floor, all out of sight.
 
-    Without workers nothing is added.
+    Without workers, nothing is added.
 
     Args:
-        spec: the scene, to which the workers have been added.
+        spec: specification of the scene, to which the workers have been added.
         prefixes: prefixes of the workers' names.
         loads: names of the props that lie on the floor.
     """
@@ -96,7 +96,7 @@ def index_visuals(
     Args:
         model: the drawing model.
         prefixes: prefixes of the workers' names.
-        bodies: names of the bodies that each worker has.
+        bodies: names of the bodies that each worker can have.
     """
     pairs = [(w, n) for w in range(len(prefixes)) for n in range(len(bodies))]
     starts = {(w, n): f"{prefixes[w]}{bodies[n]}_" for w, n in pairs}
@@ -119,7 +119,7 @@ def index_visuals(
 
 
 def _prop_rows(model: mujoco.MjModel) -> Ints:
-    """Return `WorkerVisuals.props` of a model: a column for each prop, filled from above."""
+    """Return `WorkerVisuals.props` of a drawing model."""
     moved = np.flatnonzero(model.body_mocapid >= 0)
     names = [model.body(body).name.rpartition("/")[2] for body in moved]
     ids = [
@@ -133,10 +133,10 @@ def _prop_rows(model: mujoco.MjModel) -> Ints:
 
 
 def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None) -> None:
-    """Show each worker in one of its bodies.
+    """Show one body of each worker, and hide the others.
 
     Args:
-        model: a drawing model of the caller's own, which is changed.
+        model: drawing model of the caller, which is changed.
         visuals: indices of skins and hats.
         body: (W,) index of each worker's body; None for the first.
     """
@@ -154,10 +154,10 @@ def show_workers(
     """Pose the workers of one environment in their bodies, with the props that they hold.
 
     Args:
-        model: a drawing model of the caller's own, which is changed.
-        data: its state, which is changed.
+        model: drawing model of the caller, which is changed.
+        data: state of the model, which is changed.
         visuals: indices of skins, hats and props.
-        motion: the workers' poses, arrays (W, S, ...).
+        motion: poses of the workers, arrays (W, S, ...).
     """
     rows = visuals.segments
     if not rows.size:
@@ -169,13 +169,13 @@ def show_workers(
 
 
 def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Held | None) -> None:
-    """Pose the props that are held or lie on the floor, and park all others below it.
+    """Pose the props that are held or lie on the floor, and hide all others below the floor.
 
     Args:
-        model: a drawing model of the caller's own, which is changed.
-        data: its state, which is changed.
+        model: drawing model of the caller, which is changed.
+        data: state of the model, which is changed.
         rows: `WorkerVisuals.props`.
-        held: the props, arrays (W + L, ...); None for none.
+        held: props that are held or lie on the floor, arrays (W + L, ...); None if there are none.
     """
     if not rows.size:
         return
@@ -191,11 +191,11 @@ def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Hel
 
 
 def assign_props(rows: Ints, held: Held | None) -> Ints:
-    """Return (W + L,) the mocap row for each prop that is held or lies on the floor; -1 for none.
+    """Return mocap indices (W + L,) for the props that are held or lie on the floor; -1 if unused.
 
     Args:
         rows: `WorkerVisuals.props`.
-        held: the props, arrays (W + L, ...); None for none.
+        held: props that are held or lie on the floor, arrays (W + L, ...); None if there are none.
     """
     kind = np.zeros(0, np.int64) if held is None else held.kind
     shown = np.full(len(kind), -1)
@@ -206,7 +206,7 @@ def assign_props(rows: Ints, held: Held | None) -> Ints:
 
 
 def _add_skin(spec: mujoco.MjSpec, skin: SkinMesh, body: Body, prefix: str) -> None:
-    """Add a skin of a body, with its material, to the worker with this prefix."""
+    """Add a skin of a body, with its material, to the worker with a given prefix."""
     material = f"{body.names[0]}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
@@ -227,7 +227,7 @@ def _add_skin(spec: mujoco.MjSpec, skin: SkinMesh, body: Body, prefix: str) -> N
 
 
 def _add_cloth(spec: mujoco.MjSpec, skin: SkinMesh, name: str) -> None:
-    """Add the material and the texture of a skin under a name."""
+    """Add the material and the texture of a skin with a given name."""
     height, width = skin.texture.shape[:2]
     texture = spec.add_texture(
         name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=3
@@ -238,7 +238,7 @@ def _add_cloth(spec: mujoco.MjSpec, skin: SkinMesh, name: str) -> None:
 
 
 def _add_hat(spec: mujoco.MjSpec, hat: HatMesh, body: Body, prefix: str) -> None:
-    """Add the hat of a body to the head of the worker with this prefix."""
+    """Add the hat of a body to the head of the worker with a given prefix."""
     name = f"{body.names[0]}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(

@@ -1,14 +1,14 @@
-"""Tasks of the robot, one class a file. None of them reads a camera."""
+"""Tasks of the robot, with one class in each module; no task reads camera images."""
 
 from dataclasses import dataclass
 
 EPISODE_STEPS = 250
-"""Time limit of an episode unless its task has another one [control steps]: 10 s at 25 Hz."""
+"""Default time limit of an episode [control steps]: 10 s at 25 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltIn:
-    """A task of the package, known before its file is imported."""
+    """Record of a built-in task, which is available before its module is imported."""
 
     path: str
     """Module and class of the task, as "module:class"."""
@@ -25,6 +25,6 @@ BUILT_IN = {
     "HRCReachGoal-v0": BuiltIn("hrc_env.tasks.reach_goal:ReachGoal", 100),
     "HRCPickPlaceGoal-v0": BuiltIn("hrc_env.tasks.pick_place_goal:PickPlaceGoal", 750),
 }
-"""The package's tasks by their ids."""
+"""Built-in tasks by ID."""
 DEFAULT = next(iter(BUILT_IN))
-"""Id of the task that is taken where none is given."""
+"""ID of the default task."""

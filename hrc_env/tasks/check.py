@@ -1,4 +1,4 @@
-"""Check a task that a user brings, before an environment of it is made."""
+"""Checks of a custom task, before an environment is made from it."""
 
 import inspect
 import re
@@ -25,7 +25,7 @@ from hrc_env.world import TaskScene
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 Terms: TypeAlias = tuple[object, ...]
 REQUIRED = ("make_state", "reset", "advance", "view", "info")
-"""The methods that every task must define."""
+"""Names of the methods that every task must define."""
 RENAMED = {
     "init": "make_state",
     "says": "the class's docstring",
@@ -41,13 +41,13 @@ RENAMED = {
     "grips": "needs_gripper",
     "drives": "needs_mobile_base",
 }
-"""Present names of a task's parts by their former names."""
+"""Present names of a task's attributes and methods, by their former names."""
 
 
 def check_task(task: object) -> None:
-    """Raise `ConfigError` for a missing or wrong part of a task's class.
+    """Raise `ConfigError` if a part of a task class is missing or invalid.
 
-    Shapes and values of its terms are checked when an environment of it is reset and steps.
+    Shapes and values of its terms are checked later, when its environment is reset and stepped.
     """
     if not is_task_class(task):
         raise ConfigError(
@@ -59,7 +59,7 @@ def check_task(task: object) -> None:
 
 
 def check_parts(task: TaskType) -> None:
-    """Raise `ConfigError` for missing or wrong parts of a class, regardless of its id."""
+    """Raise `ConfigError` if a part of a class other than its ID is missing or invalid."""
     _check_names(task)
     _check_attributes(task)
     _check_methods(task)
@@ -80,7 +80,7 @@ def check_parts(task: TaskType) -> None:
 
 
 def _check_goal(who: str, goal: Goal, config: Any) -> None:
-    """Refuse a reward that is not of each pair of goals for itself, however many there are."""
+    """Raise `ConfigError` if the reward of a pair of goals depends on the other pairs."""
     name, size = f"{who}: Goal.reward", check_integer(f"{who}: Goal.size", goal.size, 1, 2**62)
     rng = np.random.default_rng(0)
     achieved = goal.bound * rng.uniform(-1, 1, (2, 3, size))
@@ -107,7 +107,7 @@ def _check_goal(who: str, goal: Goal, config: Any) -> None:
 
 
 def _describe(task: object) -> str:
-    """Return a name for an object that is no class of a task, for an error."""
+    """Return a description of an object that is not a task class, for an error message."""
     if isinstance(task, Task):
         name = cast(object, task).__class__.__name__
         return f"an object of it: register the class {name} itself"
@@ -115,7 +115,7 @@ def _describe(task: object) -> str:
 
 
 def _check_names(task: TaskType) -> None:
-    """Refuse former names, and methods with names close to those of hooks."""
+    """Raise `ConfigError` for former names, and for methods named similarly to hooks."""
     bases = takewhile(lambda base: base is not Task, task.__mro__)
     names = [name for base in bases for name in vars(base)]
     for name in names:
@@ -133,7 +133,7 @@ def _check_names(task: TaskType) -> None:
 
 
 def _check_attributes(task: TaskType) -> None:
-    """Refuse attributes of the class with a wrong type."""
+    """Raise `ConfigError` if an attribute of the class has a wrong type."""
     for name in ("starts", "ends", "scene", "viewpoint"):
         check_kind(f"{task.id}: {name}", getattr(task, name), str)
     check_kind(f"{task.id}: robot", task.robot, str, None)
@@ -144,7 +144,7 @@ def _check_attributes(task: TaskType) -> None:
 
 
 def _check_methods(task: TaskType) -> None:
-    """Refuse hooks that are missing, are no functions, or take other arguments."""
+    """Raise `ConfigError` if a hook is missing, is not a function, or has other parameters."""
     for name in HOOKS:
         hook, expected = getattr(task, name), getattr(Task, name)
         if name in REQUIRED and hook is expected:
@@ -154,7 +154,7 @@ def _check_methods(task: TaskType) -> None:
         wanted = list(inspect.signature(expected).parameters)
         try:
             signature = inspect.signature(inspect.getattr_static(task, name))
-        except (TypeError, ValueError):  # of a static method or a function in C
+        except (TypeError, ValueError):  # not introspectable
             continue
         try:
             signature.bind(*wanted)
@@ -166,7 +166,7 @@ def _check_methods(task: TaskType) -> None:
 
 
 def _check_terms(task: AnyTask) -> None:
-    """Refuse terms of another type, and two terms of one name."""
+    """Raise `ConfigError` if a term has a wrong type, or two terms have the same name."""
     for name, kind in (("observations", ObservationTerm), ("rewards", RewardTerm)):
         terms: object = getattr(task, name)
         is_tuple = isinstance(terms, tuple)
@@ -179,7 +179,7 @@ def _check_terms(task: AnyTask) -> None:
 
 
 def _check_state(task: AnyTask) -> None:
-    """Refuse a state that has not one row for each environment, and a wrong info of it."""
+    """Raise `ConfigError` if the state lacks a row per environment, or its info is invalid."""
     state = task.make_state(2)
     if is_dataclass(state) and not isinstance(state, type):
         parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
@@ -199,7 +199,7 @@ def _check_state(task: AnyTask) -> None:
 
 
 def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
-    """Raise `ConfigError` for an info of a task with missing names or other shapes."""
+    """Raise `ConfigError` if a task's info lacks names or contains wrong shapes."""
     for part, counts in (("achieved", "successful"), ("failed", "failed")):
         if not isinstance(name := getattr(task, part), str) or not name.startswith("task/"):
             raise ConfigError(
@@ -222,10 +222,11 @@ def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
 
 
 def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
-    """Raise `ConfigError` for an invalid count of attempts or success in the info of a step.
+    """Raise `ConfigError` if the info of a step has invalid numbers of attempts or success.
 
-    `achieved` and `failed` count attempts, 0 or more. `is_success` is 1 if the episode would be a
-    success if it ended now, else 0. The two are different measures, and tables show both.
+    `achieved` and `failed` are non-negative numbers of attempts. `is_success` is 1 if the episode
+    would be a success if it ended now, and otherwise 0. These are different measures, and tables
+    show both.
     """
     for name in (task.achieved, task.failed):
         values = np.asarray(info[name], float)

@@ -1,10 +1,10 @@
-"""Delivery: a mobile base brings material across a site, among the people who work there.
+"""Delivery: a mobile base transports material across a site on which people work.
 
-Zones lie on free floor away from workplaces; an episode has two of them, a certain way apart. The
-material is on the bed from the start, and is delivered when the base stands in its zone; nothing is
-unloaded. The map of the obstacles is known: the way to the zone, which leads round all of them, and
-the ranges of the base's scanner follow from that map, not from pictures. People are not on it: they
-are known by the estimate only.
+Zones are areas of free floor away from workplaces. In an episode, the base starts in one zone and
+drives to another. The material is on the bed from the start, and is delivered when the base stands
+in the destination zone; it is not unloaded. The map of the obstacles is known: the path to the
+zone, which avoids all obstacles, and the ranges of the base's scanner are computed from that map,
+not from images. The map does not contain people; only the estimate does.
 """
 
 import math
@@ -34,33 +34,34 @@ from hrc_env.tasks.task import Task
 from hrc_env.world import Grounds, World
 
 CELL_M = 0.2
-"""Distance of neighbouring points of the map's grid [m]."""
+"""Spacing of the map's grid points [m]."""
 MAP_BORDER_M = 3.0
-"""Width of the map beyond the area where people walk, on which the base may drive, too [m]."""
+"""Width of the map's border around the area where people walk, on which the base may also drive
+[m]."""
 HALF_WIDTH_M = 0.40
-"""Least distance of the base's middle from an obstacle [m]."""
+"""Minimum distance of the base's centre from an obstacle [m]."""
 TURNING_RADIUS_M = 0.66
-"""Distance from an obstacle from which on the base may have any heading [m]."""
+"""Distance from an obstacle beyond which the base may have any heading [m]."""
 NARROW_COST = 3.0
-"""Cost of a metre of the way where the base is nearer to an obstacle than `TURNING_RADIUS_M`."""
+"""Cost of a metre of the path within `TURNING_RADIUS_M` of an obstacle; elsewhere it is 1."""
 ZONE_CLEARANCE_M = 0.75
-"""Least distance of a zone's middle from an obstacle [m]."""
+"""Minimum distance of a zone's centre from an obstacle [m]."""
 ZONE_FROM_WORK_M = 1.6
-"""Least distance of a zone's middle from a workplace [m]."""
+"""Minimum distance of a zone's centre from a workplace [m]."""
 ZONE_SPACING_M = 1.6
-"""Least distance of the middles of two zones [m]."""
+"""Minimum distance between the centres of two zones [m]."""
 START_M = 0.2
-"""Largest shift of a base's start from the middle of its zone along x and along y [m]."""
+"""Largest offset of a base's initial position from the centre of its zone, along x and y [m]."""
 RAYS = 24
 """Number of the scanner's rays."""
 RANGE_M = 6.0
 """Maximum range of the scanner [m]."""
 ANGLES = 2 * np.pi * np.arange(RAYS) / RAYS
-"""(RAYS,) direction of each ray from the world's x axis to the left [rad]."""
+"""(RAYS,) direction of each ray, counterclockwise from the world's x axis [rad]."""
 GRADIENT_STEP_M = 0.4
-"""Distance to either side over which the gradient of the remaining way is taken [m]."""
+"""Step of the central differences of the remaining path length [m]."""
 MARKER_HEIGHT_M = 0.05
-"""Height above the floor at which pictures show the zone [m]."""
+"""Height above the floor of the zone's marker in pictures [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,19 +69,19 @@ class DeliveryConfig:
     """Criteria and rewards of a delivery."""
 
     way_m: tuple[float, float] = (7.0, 16.0)
-    """Least and greatest length of the way between start and destination [m]."""
+    """Minimum and maximum length of the path from start to destination [m]."""
     zone_m: float = 0.4
-    """Radius of a zone, within which the base's middle must stand [m]."""
+    """Radius of a zone, within which the base's centre must come to rest [m]."""
     standing_m_s: float = 0.05
-    """Speed below which the base stands [m/s]."""
+    """Speed below which the base is at rest [m/s]."""
     reward: str = "dense"
-    """"dense" rewards every metre of progress, too; "sparse" only the delivery."""
+    """Kind of reward: "sparse" rewards only the delivery, "dense" also every metre of progress."""
     progress_per_m: float = 1.0
-    """Dense reward for every metre by which the remaining way becomes shorter."""
+    """Dense reward for every metre by which the remaining path becomes shorter."""
     delivered_bonus: float = 20.0
     """Reward for the delivery."""
     hit_penalty: float = 5.0
-    """Penalty, dense and sparse, whenever the base begins to touch an obstacle."""
+    """Penalty for each time the base begins to touch an obstacle, in both kinds of reward."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "zone_m", "standing_m_s")
@@ -93,41 +94,42 @@ class DeliveryConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Site:
-    """The task's map of a place: obstacles, zones and the ways between them."""
+    """The task's map of a scene: obstacles, zones and the paths between them."""
 
     footprints: Floats
     """(N, 5) footprints of the obstacles, as in `Grounds.blocked`."""
     origin: Floats
-    """(2,) first point of the grids, x and y [m]."""
+    """(2,) position of the grids' first point, x and y [m]."""
     gaps: Floats
-    """(X, Y) distance of each grid point from the nearest obstacle, negative inside one [m]."""
+    """(X, Y) distance of each grid point from the nearest obstacle [m]; negative inside an
+    obstacle."""
     zones: Floats
-    """(Z, 2) middles of the zones between which material is brought [m]."""
+    """(Z, 2) centres of the zones between which material is transported [m]."""
     ways: Floats
-    """(Z, X, Y) length of the way from each grid point to each zone [m]."""
+    """(Z, X, Y) length of the path from each grid point to each zone [m]."""
     lengths: Floats
-    """(Z, Z) length of the way from each zone (rows) to each (columns) [m]."""
+    """(Z, Z) length of the path from each zone (row) to each other zone (column) [m]."""
 
 
 class DeliveryState:
     """State of one environment's delivery."""
 
     zone: int
-    """Index of the zone to which the material goes."""
+    """Index of the destination zone."""
     goal_world: Annotated[Floats, (2,)]
-    """Middle of that zone, x and y [m]."""
+    """Centre of the destination zone, x and y [m]."""
     way_m: float
-    """Length of the remaining way [m]."""
+    """Length of the remaining path [m]."""
     way_direction: Annotated[Floats, (2,)]
-    """Unit vector along the way from the base, x and y."""
+    """Unit vector from the base along the remaining path, x and y."""
     ranges_m: Annotated[Floats, (RAYS,)]
-    """Range of each of the scanner's rays [m]."""
+    """Range that the scanner measures along each ray [m]."""
     touching: bool
     """Whether the base touches an obstacle."""
     people: bool
     """Whether the base touches a worker."""
     hits: Annotated[Ints, (2,)]
-    """Number of times it began to touch an obstacle, and a worker."""
+    """Numbers of times that the base began to touch an obstacle, and a worker."""
     delivered: bool
     """Whether the material has been delivered."""
 
@@ -136,11 +138,11 @@ class DeliveryStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining way became shorter [m]."""
+    """Length by which the remaining path became shorter [m]."""
     hit: bool
     """Whether the base began to touch an obstacle."""
     delivered: bool
-    """Whether the base stands in its zone."""
+    """Whether the base is at rest in the destination zone."""
 
 
 DELIVERY = dtype_of(DeliveryState)
@@ -151,36 +153,36 @@ class DeliveryView:
     """Knowledge of the robots about their task."""
 
     goal_world: Floats
-    """(B, 2) middle of the zone, x and y [m]."""
+    """(B, 2) centre of the destination zone, x and y [m]."""
     way_m: Floats
-    """(B,) length of the remaining way by the map [m]."""
+    """(B,) length of the remaining path according to the map [m]."""
     way_direction: Floats
-    """(B, 2) unit vector along that way, x and y."""
+    """(B, 2) unit vector from the base along the remaining path, x and y."""
     ranges_m: Floats
-    """(B, RAYS) ranges of the scanner on the map [m]."""
+    """(B, RAYS) ranges of the scanner, computed from the map [m]."""
 
 
 def _has_valid_length(site: Site, config: DeliveryConfig) -> Bools:
-    """Return (Z, Z) whether the way from one zone to another is within `config.way_m`."""
+    """Return a mask (Z, Z) of the pairs of zones with a path length within `config.way_m`."""
     low, high = config.way_m
     return (site.lengths >= low) & (site.lengths <= high)
 
 
 def _measure(state: Records1[DeliveryState], robot: RobotState, site: Site) -> None:
-    """Write the remaining way, its direction and the scanner's ranges at the robots' places."""
+    """Update remaining path, path direction and scanner ranges at the robots' positions."""
     state["ranges_m"] = ranges_m(robot.q, ANGLES, site.gaps, site.origin, CELL_M, RANGE_M)
     _follow_ways(robot.q, site.ways, site.origin, state)
 
 
 @kernel
 def _follow_ways(q: Floats, ways: Floats, origin: Floats, states: Records1[DeliveryState]) -> None:
-    """Write the length and the direction of each base's remaining way.
+    """Update the length and the direction of each base's remaining path.
 
     Args:
-        q: (B, 3) place of each base, x, y [m] and heading [rad].
-        ways: (Z, X, Y) length of the way from each grid point to each zone [m].
-        origin: (2,) first point of the grid [m].
-        states: (B,) with the zones; `way_m` and `way_direction` are written.
+        q: (B, 3) pose of each base, x, y [m] and heading [rad].
+        ways: (Z, X, Y) length of the path from each grid point to each zone [m].
+        origin: (2,) position of the grid's first point [m].
+        states: (B,) states with the zones, in which `way_m` and `way_direction` are written.
     """
     for b in range(len(q)):
         state, x, y = states[b], q[b, 0], q[b, 1]
@@ -277,10 +279,10 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return make_records(DeliveryState, batch)
 
     def survey(self, grounds: Grounds) -> Site:
-        """Return the zones of a place and the ways between them.
+        """Compute the zones of a scene and the paths between them.
 
         Raises:
-            ConfigError: no two zones are far enough apart.
+            ConfigError: no pair of zones has a path of a valid length.
         """
         (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
         xs = np.arange(x0 - MAP_BORDER_M, x1 + MAP_BORDER_M, CELL_M, dtype=float)
@@ -311,7 +313,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     def draw_start(
         self, rngs: Rngs, place: Site, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """Draw (n, 3) starts: in a zone with a valid destination, with any heading."""
+        """Draw initial poses (n, 3) in zones with a valid destination, with any heading."""
         has_destination = _has_valid_length(place, self.config).any(1)
         starts: list[list[float]] = []
         for rng in rngs:
@@ -321,7 +323,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return np.array(starts).reshape(-1, 3)
 
     def reset(self, state: Records1[DeliveryState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Choose the zones to which environments `ids` bring material."""
+        """Draw the destination zones of environments `ids`."""
         site: Site = world.place
         state[ids] = np.zeros((), DELIVERY)
         valid = _has_valid_length(site, self.config)
@@ -336,7 +338,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     def advance(
         self, state: Records1[DeliveryState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[DeliveryStep]:
-        """Judge the places of the bases, and return (B,) the results of the step."""
+        """Evaluate the positions of the bases, and return the results (B,) of the step."""
         site, robot, step = world.place, world.robot, make_records(DeliveryStep, len(state))
         step["progress_m"] = state["way_m"]
         _measure(state, robot, site)
@@ -354,18 +356,18 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return step
 
     def is_terminal(self, step: Records1[DeliveryStep]) -> Bools:
-        """Return (B,) whether the load was delivered in this step."""
+        """Return a mask (B,) of the environments in which the load was delivered in this step."""
         return step["delivered"]
 
     def view(self, state: Records1[DeliveryState], ids: Ints) -> DeliveryView:
-        """Return zone, remaining way and ranges of the scanner of environments `ids`."""
+        """Return zone, remaining path and ranges of the scanner in environments `ids`."""
         rows = state[ids]
         return DeliveryView(
             rows["goal_world"], rows["way_m"], rows["way_direction"], rows["ranges_m"]
         )
 
     def info(self, state: Records1[DeliveryState]) -> dict[str, Floats]:
-        """Return the results of the episode until now, (B,) each.
+        """Return the results (B,) of the current episode by name.
 
         A delivery counts as a success only if the base hit neither an obstacle nor a worker.
         """

@@ -22,64 +22,69 @@ from hrc_env.worker.body import assets_dir
 from hrc_env.world import FOOT_WORLD, Effects, TaskScene, Weld, WorkerSignal, Workplace, World
 
 BOARD_M = (0.6, 1.2, 0.0125)
-"""Edges of the board along its x, y and z axes [m]; z is the normal of its front."""
+"""Edge lengths of the board along its x, y and z axes [m]; z is the normal of its front face."""
 BOARD_KG = 6.12
 """Mass of the board [kg], at 680 kg/m^3."""
 CUPS_M = (-0.12, -0.15)
-"""Place of the suction cups on the board, along its x and y from its middle [m]."""
+"""Position of the suction cups on the board, relative to its centre along its x and y [m]."""
 STACK_M = (0.26, -0.98, -0.36)
-"""Place of the board's middle on the stack at the start, front up, from the robot's foot [m]."""
+"""Initial position of the board's centre on the stack, relative to the robot's base [m]; the front
+faces up."""
 WALL_Y_M = 1.0
-"""Place of the studs' faces along y, from the robot's foot [m]; they face the robot."""
+"""Position along y of the studs' faces, which face the robot, relative to the robot's base [m]."""
 PLACE_M = (0.29, WALL_Y_M - BOARD_M[2] / 2, 0.34)
-"""Target of the board's middle, from the robot's foot [m]."""
+"""Target position of the board's centre, relative to the robot's base [m]."""
 R_PLACE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Target world_from_board: it stands on a short edge, its front to the robot."""
+"""Target rotation world_from_board: the board stands on a short edge and its front faces the
+robot."""
 NEAR_STUD_M = 0.56
-"""Place of the stud that takes the screws along x, from the robot's foot [m]."""
+"""Position along x of the stud for the screws, relative to the robot's base [m]."""
 SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.82, 0.67, 0.52, 0.37))
-"""Places of the screws along x and z, from the robot's foot, the uppermost first [m]."""
+"""Positions of the screws along x and z, relative to the robot's base [m], from top to bottom."""
 AT_PLACE_M = 0.05
-"""Distance of the board from its target below which the worker's hands may come near [m]."""
+"""Distance of the board from its target below which the worker's hands may touch the robot's hand
+[m]."""
 HAND_NEAR_M = 1.0
-"""Distance from the screws within which an estimated hand may then touch the robot's hand [m]."""
+"""Distance from the screws within which an estimated hand may touch the robot's hand [m]."""
 BESIDE_M = (NEAR_STUD_M + 0.42, WALL_Y_M - 0.50)
-"""Place where the worker stands, x and y from the robot's foot [m]."""
+"""Position where the worker stands, x and y relative to the robot's base [m]."""
 PUSH_N = (20.0, 50.0)
-"""Range of the force with which a screwdriver pushes [N]."""
+"""Range of the force with which a screwdriver pushes on the board [N]."""
 SHEAR = 0.2
-"""Share of that force that acts along the board."""
+"""Force along the board as a fraction of the force of the screwdriver."""
 DRIVING_S = 0.6
-"""Time for which a screw is driven if there is no worker [s]."""
+"""Duration of driving a screw if there is no worker [s]."""
 PAUSE_S = 0.6
-"""Time before each screw if there is no worker [s]."""
+"""Duration of the pause before each screw if there is no worker [s]."""
 MOVED_M = 0.02
-"""Largest shift of the board on the stack along x and along y [m]."""
+"""Largest initial offset of the board on the stack along x and y [m]."""
 TURNED_RAD = 0.06
-"""Largest turn of the board on the stack [rad]."""
+"""Largest initial rotation of the board on the stack [rad]."""
 RADIAN_M = 0.3
-"""Length of the way that counts for a radian of the board's turn [m]."""
+"""Distance that is equivalent to a rotation of the board by 1 rad in the progress [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrywallConfig:
-    """Tolerances and rewards of holding a board."""
+    """Tolerances and rewards for holding a board."""
 
     tolerance_m: float = 0.005
-    """Distance of the board's middle from its target below which the board is in place [m]."""
+    """Distance of the board's centre from its target below which the board is in position [m]."""
     tolerance_rad: float = 0.0087
-    """Turn of the board against its target below which it is in place, half a degree [rad]."""
+    """Rotation of the board from its target below which it is in position [rad]; half a degree by
+    default."""
     push_n: tuple[float, float] = PUSH_N
     """Range of the force with which each screw is driven [N]."""
     reward: str = "dense"
-    """"dense" rewards every metre of progress, too; "sparse" only screws and the end."""
+    """Kind of reward: "sparse" rewards only screws and completion, "dense" also every metre of
+    progress."""
     progress_per_m: float = 5.0
-    """Dense reward for every metre that board and tool come nearer to their targets; a radian of
-    the board's turn counts as 0.3 m."""
+    """Dense reward for every metre by which board and tool approach their targets; a radian of the
+    board's rotation counts as 0.3 m."""
     screw_bonus: float = 3.0
-    """Reward for each screw that is driven while the board is in place."""
+    """Reward for each screw that is driven."""
     done_bonus: float = 10.0
-    """Reward for a board that is fixed in place and let go."""
+    """Reward for a board that is fixed in position and released."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "tolerance_m", "tolerance_rad")
@@ -92,34 +97,34 @@ class DrywallState:
     """State of one environment's board."""
 
     pose: Annotated[Floats, (7,)]
-    """Pose of the board at the start: position [m, world] and quaternion (w, x, y, z)."""
+    """Initial pose of the board: position [m, world] and quaternion (w, x, y, z)."""
     push_n: Annotated[Floats, (len(SCREWS_M),)]
     """Force with which each screw is driven [N]."""
     shear: Annotated[Floats, (len(SCREWS_M), 2)]
-    """Force along the board while each screw is driven, along x and z, as shares of `push_n`."""
+    """Force along the board while each screw is driven, along x and z, as fractions of `push_n`."""
     pressed_s: float
-    """Time for which the board has been held or fixed in place [s]."""
+    """Time for which the board has been held or fixed in position [s]."""
     driven: int
-    """Number of screws that are driven."""
+    """Number of screws that have been driven."""
     boring: bool
     """Whether a screw is being driven."""
     max_offset_m: float
     """Largest distance of the board from its target while screws were driven [m]."""
     max_rotation_rad: float
-    """Largest turn of the board against its target while screws were driven [rad]."""
+    """Largest rotation of the board from its target while screws were driven [rad]."""
     spoilt: bool
-    """Whether the board was out of place while a screw was driven."""
+    """Whether the board was out of position while a screw was driven."""
     done: bool
-    """Whether the board is fixed in place and let go."""
+    """Whether the board is fixed in position and released."""
     left_m: float
-    """Length of the ways that board and tool have before them [m]."""
+    """Remaining distance of board and tool to their targets, in total [m]."""
 
 
 class DrywallStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining ways became shorter [m]."""
+    """Decrease of the remaining distance [m]."""
     driven: int
     """Number of screws that were driven in this step."""
     done: bool
@@ -134,16 +139,16 @@ class DrywallView:
     """Knowledge of the robots about their task."""
 
     place_world: Points3
-    """(3,) target of the board's middle [m]."""
+    """(3,) target position of the board's centre [m]."""
     driven: Ints
-    """(B,) number of screws that are driven."""
+    """(B,) number of screws that have been driven."""
 
 
 class BoardOffset(NamedTuple):
-    """Deviation of boards from their target."""
+    """Deviation of boards from their target pose."""
 
     distance_m: Floats
-    """(B,) distance of the board's middle from its target [m]."""
+    """(B,) distance of the board's centre from its target [m]."""
     angle_rad: Floats
     """(B,) angle between the board and its target orientation [rad]."""
 
@@ -152,19 +157,19 @@ class ScrewProgress(NamedTuple):
     """Progress of the screws at the end of a step."""
 
     driven: Ints
-    """(B,) number of screws that are driven."""
+    """(B,) number of screws that have been driven."""
     boring: Bools
     """(B,) whether a screw is being driven."""
 
 
 def measure_offset(board: ObjectState) -> BoardOffset:
-    """Return the deviation of boards (B, 1) from their target."""
+    """Compute the deviation of boards (B, 1) from their target pose."""
     off_m = np.linalg.norm(board.position_world[:, 0] - (FOOT_WORLD + PLACE_M), axis=-1)
     return BoardOffset(off_m, _measure_turn(matrix(board.quaternion_wxyz[:, 0])))
 
 
 def _measure_turn(R: Rotations) -> Floats:
-    """Return (B,) the angle between world_from_board (B, 3, 3) and its target [rad]."""
+    """Compute the angle (B,) between rotations world_from_board (B, 3, 3) and the target [rad]."""
     trace = np.einsum("ij,bij->b", R_PLACE, R)
     return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
 
@@ -172,13 +177,13 @@ def _measure_turn(R: Rotations) -> Floats:
 def _measure_ways(
     board_world: Points3, R: Rotations, tool_world: Points3, is_taken: Bools
 ) -> Floats:
-    """Return (B,) the length of the ways that remain [m].
+    """Compute the remaining distance (B,) of boards and tools to their targets [m].
 
     Args:
-        board_world: (B, 3) middles of the boards [m].
-        R: (B, 3, 3) world_from_board.
+        board_world: (B, 3) centres of the boards [m].
+        R: (B, 3, 3) rotations world_from_board.
         tool_world: (B, 3) tool points of the robots [m].
-        is_taken: (B,) whether the tool's way to the board is behind it.
+        is_taken: (B,) whether the tool has already reached the board.
     """
     away_m = np.linalg.norm(board_world - (FOOT_WORLD + PLACE_M), axis=-1)
     away_m = away_m + RADIAN_M * _measure_turn(R)
@@ -186,9 +191,9 @@ def _measure_ways(
 
 
 def _advance_screws(state: Records1[DrywallState], world: World, dt_s: float) -> ScrewProgress:
-    """Return the screws' progress at the end of a step of dt_s [s].
+    """Return the progress of the screws at the end of a step of dt_s [s].
 
-    The worker drives them; without a worker they are driven by themselves while the board is
+    The worker drives the screws; without a worker, they are driven automatically while the board is
     pressed against the studs.
     """
     n, driven = len(SCREWS_M), state["driven"]
@@ -275,7 +280,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return make_records(DrywallState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return stack, board and studs, and the place of the worker that drives the screws."""
+        """Return stack, board and studs, and the workplace where the worker drives the screws."""
         place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
         return TaskScene(
             Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
@@ -287,12 +292,12 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         )
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Return the place of the cups when the board is in place."""
+        """Return the position of the suction cups when the board is in position."""
         front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
         return [ReachTarget("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
 
     def reset(self, state: Records1[DrywallState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Lay the board of environments `ids` onto the stack."""
+        """Draw the initial pose of the board on the stack and the forces, in environments `ids`."""
         state[ids] = np.zeros((), DRYWALL)
         low, high = self.config.push_n
         for b in map(int, ids):
@@ -316,7 +321,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     def advance(
         self, state: Records1[DrywallState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[DrywallStep]:
-        """Judge the place of the board and the screws, and return (B,) the results of the step."""
+        """Evaluate the board's pose and the screws, and return the results (B,) of the step."""
         board, step = require(world.objects, "A board"), make_records(DrywallStep, len(state))
         off_m, off_rad = measure_offset(board)
         fine = (off_m < self.config.tolerance_m) & (off_rad < self.config.tolerance_rad)
@@ -345,7 +350,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return step
 
     def effects(self, state: Records1[DrywallState]) -> Effects:
-        """Return the push of the screw that is being driven; four screws fix the board."""
+        """Return the force of the screw that is being driven; four screws fix the board."""
         screw = np.minimum(state["driven"], len(SCREWS_M) - 1)
         rows = np.arange(len(state))
         push_n = np.where(state["boring"], state["push_n"][rows, screw], 0.0)
@@ -357,17 +362,17 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
     def signal(self, state: Records1[DrywallState]) -> WorkerSignal:
-        """Return the stages: the worker may begin while the board is in its place."""
+        """Return the stages: the worker may work while the board is in position."""
         return WorkerSignal(
             (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
         )
 
     def is_load(self, state: Records1[DrywallState]) -> Bools:
-        """Return (B, 1) whether the board counts as part of the robot: until it is in place."""
+        """Return a mask (B, 1) of the boards that count as part of the robot, until in position."""
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms with a hand near the screws while the board is held in place."""
+        """Return a mask (B, W, S) of arms near the screws, while the board is held in position."""
         board = require(belief.objects, "A board")
         is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
         screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
@@ -376,17 +381,17 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return arms & is_held_there[:, None, None]
 
     def is_terminal(self, step: Records1[DrywallStep]) -> Bools:
-        """Return (B,) whether the fixed board was let go in this step."""
+        """Return a mask (B,) of the environments in which the fixed board was just released."""
         return step["done"]
 
     def view(self, state: Records1[DrywallState], ids: Ints) -> DrywallView:
-        """Return the board's target and the driven screws of environments `ids`."""
+        """Return the board's target and the number of driven screws in environments `ids`."""
         return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
     def info(self, state: Records1[DrywallState]) -> dict[str, Floats]:
-        """Return the screws and the board's largest deviation while they were driven, (B,) each.
+        """Return numbers of screws and largest deviations of the board (B,) by name.
 
-        An episode is a success if the board is fixed in place and let go.
+        An episode is a success if the board is fixed in position and released.
         """
         begun = (state["driven"] > 0) | state["boring"]
         return {
@@ -398,5 +403,5 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         }
 
     def markers(self, view: DrywallView) -> Points3:
-        """Return the target (B, 1, 3) of the board's middle [m]."""
+        """Return the target position (B, 1, 3) of the board's centre [m]."""
         return np.broadcast_to(view.place_world, (len(view.driven), 1, 3))

@@ -1,7 +1,7 @@
-"""Goals that are kept apart from the observation, so that transitions can be relabelled.
+"""Goals that are separate from the observation, so that transitions can be relabelled.
 
-Hindsight experience replay needs this (HER; Andrychowicz et al. 2017, arXiv:1707.01495): the
-reward must be a function of the achieved and the desired goal, for any number of pairs at once.
+Hindsight experience replay (HER; Andrychowicz et al. 2017, arXiv:1707.01495) requires this: the
+reward must be a function of the achieved and the desired goal, vectorized over any number of pairs.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,20 +20,20 @@ from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
 
 ACHIEVED = "achieved_goal"
-"""Name of the achieved goal in an observation."""
+"""Key of the achieved goal in an observation dictionary."""
 DESIRED = "desired_goal"
-"""Name of the desired goal in an observation."""
+"""Key of the desired goal in an observation dictionary."""
 TERM = "goal"
-"""Name of the reward's term that follows from a goal."""
+"""Name of the reward term that depends on the goal."""
 Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
-"""Info of a step or of several: one a pair of goals, or arrays by name as a vector environment has
-them; None stands for an empty info."""
+"""Type of infos: that of one step, a sequence with one for each pair of goals, or arrays by name
+like those of a vector environment; None for an empty info."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A goal that is kept apart from the observation, as hindsight replay (HER) needs it.
+    """A goal that is separate from the observation, for hindsight experience replay (HER).
 
         import numpy as np
         from hrc_env import Goal
@@ -47,11 +47,11 @@ class Goal:
             doc="Minus the distance of the tool from the goal [m].",
         )
 
-    In a task with the attribute `goal` observations are dictionaries of `observation`,
-    `achieved_goal` and `desired_goal`, `reward` is a term of the reward, and `compute_reward` and
-    `train --algorithm sac` reward transitions for other goals. Functions are over batches (B, ...).
-    The observation must not hold the goal: a transition that is relabelled with another goal would
-    still hold the old one.
+    If a task has the attribute `goal`, its observations are dictionaries of `observation`,
+    `achieved_goal` and `desired_goal`, and `reward` is a term of the reward. `compute_reward` and
+    `train --algorithm sac` can then reward transitions for other goals. All functions work on
+    batches (B, ...). The observation must not contain the goal, because a transition that is
+    relabelled with another goal would still contain the old one.
     """
 
     size: int
@@ -59,17 +59,17 @@ class Goal:
     bound: float
     """Largest magnitude of an entry; larger values are clipped."""
     achieved: Callable[[Belief], Floats]
-    """Function of the belief that returns (B, size) the achieved goal, as the robot knows it."""
+    """Function of the belief that returns the achieved goals (B, size), as known to the robot."""
     desired: Callable[[Belief], Floats]
-    """Function of the belief that returns (B, size) the desired goal."""
+    """Function of the belief that returns the desired goals (B, size)."""
     reward: Callable[[Floats, Floats, Any], Floats]
-    """Function of achieved (..., size), desired (..., size) and the task's settings that returns
-    (...) the reward."""
+    """Function of achieved goals (..., size), desired goals (..., size) and the task's settings
+    that returns the rewards (...)."""
     doc: str
-    """A sentence about the reward for the environment's page."""
+    """Sentence about the reward for the environment's page."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for functions that take other arguments."""
+        """Raise `ConfigError` if a function does not take the expected arguments."""
         for name in ("achieved", "desired"):
             check_arguments(f"Goal.{name}", getattr(self, name), "belief")
         check_arguments("Goal.reward", self.reward, "achieved", "desired", "settings")
@@ -79,13 +79,13 @@ class GoalPair(NamedTuple):
     """Achieved and desired goals as finite numbers."""
 
     achieved: Floats
-    """(size,) or (B, size) the achieved goals."""
+    """(size,) or (B, size) achieved goals."""
     desired: Floats
-    """(size,) or (B, size) the desired goals."""
+    """(size,) or (B, size) desired goals."""
 
 
 def observe_goal(goal: Goal, belief: Belief) -> dict[str, Tensor]:
-    """Return the goal's parts of an observation by name, each (B, size) float32."""
+    """Return the achieved and desired goals in an observation by name, each (B, size) float32."""
     values = {
         ACHIEVED: _evaluate("Goal.achieved", goal.achieved, belief),
         DESIRED: _evaluate("Goal.desired", goal.desired, belief),
@@ -97,14 +97,14 @@ def observe_goal(goal: Goal, belief: Belief) -> dict[str, Tensor]:
 
 
 def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -> Floats:
-    """Return (B, size) the value of a function; a user's function gets a read-only belief."""
+    """Return the value (B, size) of a function; a user's function receives a read-only belief."""
     if is_of_user(function):
         return call_user_function(name, function, lend_belief(belief))
     return function(belief)
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
-    """Return the reward's term of a goal, if there is one; it is computed from the observation."""
+    """Return the reward term of a goal, computed from the observation; empty without a goal."""
     if goal is None:
         return ()
 
@@ -131,14 +131,14 @@ def compute_reward(
         goal: the task's goal.
         achieved: (size,) or (B, size) achieved goals.
         desired: (size,) or (B, size) desired goals.
-        info: of the step. Its entries "reward/..." of the `others` are added, so that the sum is
-            the step's reward, bit for bit; a missing entry counts 0.
+        info: info of the step. Its entries "reward/..." of the `others` are added, so that the sum
+            is exactly the reward of the step; a missing entry counts as 0.
         config: settings of the task.
-        others: names of the reward's other terms, in their order.
-        factor: factor on the goal's term (`set_reward`).
+        others: names of the other reward terms, in order.
+        factor: factor on the goal's term, as set by `set_reward`.
 
     Returns:
-        A number, or (B,).
+        The reward: a number, or an array (B,).
     """
     pair = _check_pair(goal, achieved, desired)
     reward = call_user_function("Goal.reward", goal.reward, *read_only(pair), config)
@@ -155,17 +155,17 @@ def compute_terminated(
     info: Infos,
     entries: Sequence[str] = (),
 ) -> Bools | bool:
-    """Return whether the steps of these infos end their episodes, which reached goals never do.
+    """Return whether steps with given infos end their episodes; reaching a goal never ends one.
 
     Args:
         goal: the task's goal.
         achieved: (size,) or (B, size) achieved goals.
         desired: (size,) or (B, size) desired goals.
-        info: of the step, as for `compute_reward`.
-        entries: names in the info, any of which ends an episode where its value is above 0.
+        info: info of the step, as for `compute_reward`.
+        entries: names in the info; the episode ends if the value of any of them is positive.
 
     Returns:
-        A bool, or (B,).
+        A bool, or an array (B,) of bools.
     """
     shape = _check_pair(goal, achieved, desired).achieved.shape[:-1]
     over = np.zeros(shape, bool)
@@ -175,7 +175,7 @@ def compute_terminated(
 
 
 def _check_pair(goal: Goal, achieved: ArrayLike, desired: ArrayLike) -> GoalPair:
-    """Return both goals as numbers, or raise `ConfigError` for other shapes or values."""
+    """Return both goals as arrays, or raise `ConfigError` if a shape or value is invalid."""
     pair = GoalPair(_check_numbers(ACHIEVED, achieved), _check_numbers(DESIRED, desired))
     shape = pair.achieved.shape
     if pair.desired.shape != shape or len(shape) not in (1, 2):
@@ -188,7 +188,7 @@ def _check_pair(goal: Goal, achieved: ArrayLike, desired: ArrayLike) -> GoalPair
 
 
 def _check_numbers(name: str, values: ArrayLike) -> Floats:
-    """Return values as an array, or raise `ConfigError` for any that is not finite."""
+    """Return values as an array, or raise `ConfigError` if any of them is not finite."""
     numbers = np.asarray(values, float)
     if not np.isfinite(numbers).all():
         raise ConfigError(f"{name} must be finite numbers, got {numbers}.")
@@ -196,15 +196,15 @@ def _check_numbers(name: str, values: ArrayLike) -> Floats:
 
 
 def _read_info(info: Infos, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return the values of an entry of infos, 0 where it is missing.
+    """Return the values of an entry in infos, or 0 if it is missing.
 
     Args:
-        info: of one step or of several.
+        info: info of one step or of several steps.
         name: name of the entry.
-        shape: () or (B,), the expected shape of several values.
+        shape: expected shape of several values, () or (B,).
 
     Raises:
-        ConfigError: the entry has another shape.
+        ConfigError: the shape of the entry is wrong.
     """
     if info is None:
         return np.zeros(shape)

@@ -1,4 +1,4 @@
-"""Handover: the robot brings a tool to a worker that comes, puts out a hand and takes it."""
+"""Handover: the robot brings a tool; a worker approaches, extends a hand and takes it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,68 +30,70 @@ from hrc_env.world import (
 )
 
 BAR_M = (0.03, 0.03, 0.40)
-"""Edges of the tool, a bar that stands upright [m]."""
+"""Edge lengths of the tool, a bar that stands upright [m]."""
 BAR_KG = 0.9
 """Mass of the tool [kg]."""
 STAND_M = (0.30, -0.62, -0.10)
-"""Place of the tool's lower end at the start, from the robot's foot [m]."""
+"""Initial position of the tool's lower end, relative to the robot's base [m]."""
 STAND_UP_M = FOOT_WORLD[2] + STAND_M[2] + BAR_M[2] / 2
-"""Height of the tool's middle above the floor at the start [m]."""
+"""Initial height of the tool's centre above the floor [m]."""
 GRIP_UP_M = -0.08
-"""Height of the robot's grip above the tool's middle [m]."""
+"""Height of the robot's grip point above the tool's centre [m]."""
 HANDLE_UP_M = 0.12
-"""Height of the handle, which the worker takes, above the tool's middle [m]."""
+"""Height of the handle, which the worker takes, above the tool's centre [m]."""
 BESIDE_M = (1.30, 0.0)
-"""Place where the worker stands, x and y from the robot's foot [m]."""
+"""Position where the worker stands, x and y relative to the robot's base [m]."""
 HAND_UP_M = 0.40
-"""Height above the foot at which the worker puts out a hand [m]."""
+"""Height above the robot's base at which the worker extends a hand [m]."""
 MEET_M = (0.78, 0.0, 0.40)
-"""Place near which the worker puts out a hand, from the robot's foot [m]."""
+"""Position near which the worker extends a hand, relative to the robot's base [m]."""
 HAND_NEAR_M = 0.7
 """Distance from the handle within which an estimated hand may touch the robot's hand [m]."""
 OFFERED_M = 0.25
-"""Distance of the handle from a hand that is put out below which the tool is offered: it then no
-longer counts as part of the robot [m]."""
+"""Distance between the handle and an extended hand below which the tool is offered and no longer
+counts as part of the robot [m]."""
 CLOSES_M = 0.02
-"""Distance from the handle below which a hand can close on it [m]."""
+"""Distance from the handle below which a hand can grasp it [m]."""
 CLOSES_M_S = 0.15
-"""Speed relative to the handle below which a hand can close on it [m/s]."""
+"""Speed relative to the handle below which a hand can grasp it [m/s]."""
 CLOSES_S = 0.4
-"""Time for which both must hold before the hand closes [s]."""
+"""Time for which distance and speed must be within their limits before the hand grasps the tool
+[s]."""
 STIFFNESS_N_M = 100.0
-"""Stiffness of the hand that holds the tool, as a spring [N/m]."""
+"""Stiffness of the worker's hand that holds the tool, modelled as a spring [N/m]."""
 DAMPING_NS_M = 12.0
-"""Damping of that spring [Ns/m], stable at 25 Hz."""
+"""Damping of the worker's hand that holds the tool [Ns/m], which is stable at 25 Hz."""
 CARRIES_S = 0.4
-"""Time within which the hand takes the tool's weight over [s]."""
+"""Time over which the hand takes over the weight of the tool [s]."""
 TWIST_NMS = np.array([0.03, 0.03, 0.001])
-"""Damping of turns about the tool's x, y and z axes by the hand [Nms]."""
+"""Rotational damping of the hand about the tool's x, y and z axes [Nms]."""
 LIFTED_M = 0.04
-"""Height above its stand from which on the tool is lifted, and the worker comes [m]."""
+"""Height above its stand beyond which the tool counts as lifted, and the worker approaches [m]."""
 APART_M = 0.14
-"""Distance of the robot's fingers from their grip from which on they have left the tool [m]; at
-twice this distance from its handle the worker's hand has lost it."""
+"""Distance of the robot's fingers from their grip point beyond which they have left the tool [m].
+The worker's hand has lost the tool at twice this distance from the handle."""
 APART_S = 0.3
-"""Time for which the fingers must have left the tool before it is handed over [s]."""
+"""Time after the fingers have left the tool until it counts as handed over [s]."""
 GRAVITY_M_S2 = 9.81
 """Acceleration of gravity [m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandoverConfig:
-    """Limit and rewards of a handover."""
+    """Force limit and rewards for a handover."""
 
     gentle_n: float = 60.0
-    """Greatest force on the worker's hand in a successful handover [N]."""
+    """Maximum force on the worker's hand in a successful handover [N]."""
     reward: str = "dense"
-    """"dense" rewards every metre of progress, too; "sparse" only taking and the end."""
+    """Kind of reward: "sparse" rewards only taking and completion, "dense" also every metre of
+    progress."""
     progress_per_m: float = 5.0
-    """Dense reward for every metre that the fingers come nearer to the tool, and the tool to the
-    place where the worker puts out a hand."""
+    """Dense reward for every metre by which the fingers approach the tool, and the tool approaches
+    the position where the worker extends a hand."""
     taken_bonus: float = 5.0
     """Reward when the worker takes the tool."""
     done_bonus: float = 10.0
-    """Reward when the tool is handed over and the robot has let go and left it."""
+    """Reward when the handover is complete: the robot has released and left the tool."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "gentle_n")
@@ -102,40 +104,40 @@ class HandoverState:
     """State of one environment's handover."""
 
     pose: Annotated[Floats, (7,)]
-    """Pose of the tool at the start: position [m, world] and quaternion (w, x, y, z)."""
+    """Initial pose of the tool: position [m, world] and quaternion (w, x, y, z)."""
     handle_world: Annotated[Points3, (3,)]
-    """Place of the handle [m]."""
+    """Position of the handle [m]."""
     lifted: bool
     """Whether the robot holds the tool above its stand."""
     offered: bool
-    """Whether a hand that is put out is near the handle."""
+    """Whether an extended hand is near the handle."""
     near_s: float
-    """Time for which a hand has been at the handle [s]."""
+    """Time for which a hand has been ready to grasp the handle [s]."""
     taken: bool
     """Whether a worker has taken the tool."""
     taken_s: float
-    """Time since then [s]."""
+    """Time since a worker has taken the tool [s]."""
     by: int
-    """Index of the worker that has taken it."""
+    """Index of the worker that has taken the tool."""
     push: Annotated[Floats, (6,)]
-    """Force [N] and torque [Nm] of the hand at the tool's middle, in the world frame."""
+    """Force [N] and torque [Nm] of the hand at the tool's centre, in the world frame."""
     max_hand_force_n: float
-    """Greatest force on the hand in this episode [N]."""
+    """Maximum force on the hand in this episode [N]."""
     away_s: float
-    """Time for which the fingers have left the tool [s]."""
+    """Time since the fingers have left the tool [s]."""
     dropped: bool
-    """Whether the tool has fallen, or the hand has lost it."""
+    """Whether the tool has fallen, or the worker's hand has lost it."""
     done: bool
-    """Whether the tool is handed over."""
+    """Whether the tool has been handed over."""
     left_m: float
-    """Length of the ways that fingers and tool have before them [m]."""
+    """Remaining distance of fingers and tool to their targets, in total [m]."""
 
 
 class HandoverStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining ways became shorter [m]."""
+    """Decrease of the remaining distance [m]."""
     taken: bool
     """Whether the worker took the tool in this step."""
     done: bool
@@ -150,22 +152,22 @@ class HandoverView:
     """Knowledge of the robots about their task."""
 
     meet_world: Points3
-    """(3,) place near which the worker puts out a hand [m]."""
+    """(3,) position near which the worker extends a hand [m]."""
     taken: Bools
-    """(B,) whether the worker has the tool, which the robot feels."""
+    """(B,) whether the worker has taken the tool, which the robot can feel."""
 
 
 class Handle(NamedTuple):
     """Motion of the tools' handles."""
 
     position_world: Points3
-    """(B, 3) place of each handle [m]."""
+    """(B, 3) position of each handle [m]."""
     velocity_world: Velocities3
     """(B, 3) velocity of each handle [m/s]."""
 
 
 def _find_handle(tool: ObjectState) -> Handle:
-    """Return place and velocity of the handles of tools (B, 1)."""
+    """Return position and velocity of the handles of tools (B, 1)."""
     R, up = matrix(tool.quaternion_wxyz[:, 0]), np.array([0.0, 0.0, HANDLE_UP_M])
     turning = np.cross(tool.spin_object[:, 0], up)
     velocity = tool.velocity_world[:, 0] + (R @ turning[..., None])[..., 0]
@@ -175,12 +177,12 @@ def _find_handle(tool: ObjectState) -> Handle:
 def _close_hands(
     state: Records1[HandoverState], workers: WorkerProgress, handle: Handle, dt_s: float
 ) -> None:
-    """Close a hand that has been at the handle for `CLOSES_S`.
+    """Let a hand grasp the tool if it has been at the handle for `CLOSES_S`.
 
     Args:
-        state: (B,) of which `offered`, `near_s`, `by` and `taken` are written.
-        workers: the hands that are put out.
-        handle: the tools' handles.
+        state: (B,) state, in which `offered`, `near_s`, `by` and `taken` are written.
+        workers: progress of the workers, with their extended hands.
+        handle: handles of the tools.
         dt_s: duration of the step [s].
     """
     if not workers.takes.shape[1]:
@@ -204,13 +206,13 @@ def _pull_tools(
     handle: Handle,
     dt_s: float,
 ) -> None:
-    """Write the push of hands that have taken a tool: springs with damping to where they grip.
+    """Compute the forces of hands that have taken a tool, modelled as damped springs.
 
     Args:
-        state: (B,) of which `push`, `taken_s`, `max_hand_force_n` and `dropped` are written.
-        workers: places and velocities of the hands.
-        tool: (B, 1) the tools.
-        handle: the tools' handles.
+        state: (B,) state, in which `push`, `taken_s`, `max_hand_force_n` and `dropped` are written.
+        workers: progress of the workers, with positions and velocities of their hands.
+        tool: (B, 1) states of the tools.
+        handle: handles of the tools.
         dt_s: duration of the step [s].
     """
     state["push"] = 0.0
@@ -238,14 +240,14 @@ def _pull_tools(
 def _measure_ways(
     tool_middle: Points3, handle: Points3, tool_world: Points3, held: Bools, taken: Bools
 ) -> Floats:
-    """Return (B,) the length of the ways of the fingers to the tool and of the handle to the hand.
+    """Compute the remaining distance (B,) of the fingers to the tool and the handle to the hand.
 
     Args:
-        tool_middle: (B, 3) middles of the tools [m].
-        handle: (B, 3) places of their handles [m].
+        tool_middle: (B, 3) centres of the tools [m].
+        handle: (B, 3) positions of the handles [m].
         tool_world: (B, 3) tool points of the robots [m].
-        held: (B,) whether the robot holds the tool, so that the fingers' way is behind them.
-        taken: (B,) whether the worker has taken it, so that no way is left.
+        held: (B,) whether the robot holds the tool, for which the distance of the fingers is 0.
+        taken: (B,) whether the worker has taken the tool, for which the remaining distance is 0.
     """
     to_tool_m = _measure_fingers_gap(tool_world, tool_middle)
     to_hand_m = np.linalg.norm(handle - (FOOT_WORLD + MEET_M), axis=-1)
@@ -253,12 +255,12 @@ def _measure_ways(
 
 
 def _measure_fingers_gap(tool_world: Points3, tool_middle: Points3) -> Floats:
-    """Return (B,) the distance of tool points from the grips of tools with these middles [m]."""
+    """Return the distance (B,) of tool points from the grip points of tools [m]."""
     return np.linalg.norm(tool_middle + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
 
 
 class Handover(Task[HandoverConfig, Records1[HandoverState]]):
-    """Bring a tool to a worker, who puts out a hand and takes it; be gentle."""
+    """Bring a tool to a worker that extends a hand and takes it, with a limited force."""
 
     id = "HRCHandover-v0"
     config_type = HandoverConfig
@@ -327,17 +329,17 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return make_records(HandoverState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return stand and tool, and the place of the worker."""
+        """Return stand and tool, and the workplace of the worker."""
         place = Workplace("meeting", "task", BESIDE_M, np.pi, HAND_UP_M)
         mjcf = Path(assets_dir() / "tasks" / "handover.xml").read_text()
         return TaskScene(mjcf, (), (place,))
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Return the place to meet the worker."""
+        """Return the position at which the robot meets the worker."""
         return [ReachTarget("the place to meet", FOOT_WORLD + MEET_M)]
 
     def reset(self, state: Records1[HandoverState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Stand the tool of environments `ids` up."""
+        """Draw the initial pose of the tool in its stand, in environments `ids`."""
         state[ids] = np.zeros((), HANDOVER)
         for b in map(int, ids):
             half = 0.5 * 0.05 * (2.0 * rngs[b].random() - 1.0)
@@ -356,7 +358,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     def advance(
         self, state: Records1[HandoverState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[HandoverStep]:
-        """Judge tool and hand, let the hand close, and return (B,) the results of the step."""
+        """Evaluate tool and hand, let the hand grasp, and return the results (B,) of the step."""
         tool, step = require(world.objects, "A tool"), make_records(HandoverStep, len(state))
         workers = require(world.workers, "What workers do")
         held, middle, handle = tool.held[:, 0], tool.position_world[:, 0], _find_handle(tool)
@@ -380,22 +382,22 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return step
 
     def effects(self, state: Records1[HandoverState]) -> Effects:
-        """Return the push of the worker's hand on the tool."""
+        """Return the force of the worker's hand on the tool."""
         return Effects({}, state["push"][:, None].copy())
 
     def signal(self, state: Records1[HandoverState]) -> WorkerSignal:
-        """Return the stages: the worker comes when the tool is lifted, and then takes it."""
+        """Return the stages and the positions of lifted tools, at which workers may take them."""
         stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
         return WorkerSignal(
             stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan)
         )
 
     def is_load(self, state: Records1[HandoverState]) -> Bools:
-        """Return (B, 1) whether the held tool counts as part of the robot: until it is offered."""
+        """Return a mask (B, 1) of the tools that count as part of the robot, until offered."""
         return ~(state["offered"] | state["taken"])[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms with a hand near the handle while the robot brings the tool."""
+        """Return a mask (B, W, S) of arms near the handle, while the gripper holds the tool up."""
         tool = require(belief.objects, "A tool")
         middle, handle = tool.position_world[:, 0], _find_handle(tool).position_world
         away_m = _measure_fingers_gap(belief.robot.tool_world, middle)
@@ -405,18 +407,18 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return arms & is_brought[:, None, None]
 
     def is_terminal(self, step: Records1[HandoverStep]) -> Bools:
-        """Return (B,) whether the tool was handed over in this step."""
+        """Return a mask (B,) of the environments in which the tool was handed over in this step."""
         return step["done"]
 
     def view(self, state: Records1[HandoverState], ids: Ints) -> HandoverView:
-        """Return the place to meet and whether the worker has the tool, of environments `ids`."""
+        """Return meeting position and whether the worker has the tool, in environments `ids`."""
         return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
 
     def info(self, state: Records1[HandoverState]) -> dict[str, Floats]:
-        """Return whether the tool was handed over or dropped and the largest force, (B,) each.
+        """Return whether the tool was handed over or dropped, and the maximum force (B,) by name.
 
-        An episode is a success if the worker has the tool, the robot has let go and left, and the
-        force on the hand never exceeded `gentle_n`.
+        An episode is a success if the worker has the tool, the robot has released and left it, and
+        the force on the hand has never exceeded `gentle_n`.
         """
         return {
             "task/handed_over": state["done"].astype(float),
@@ -427,5 +429,5 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         }
 
     def markers(self, view: HandoverView) -> Points3:
-        """Return the place (B, 1, 3) to meet the worker [m]."""
+        """Return the position (B, 1, 3) at which the robot meets the worker [m]."""
         return np.broadcast_to(view.meet_world, (len(view.taken), 1, 3))

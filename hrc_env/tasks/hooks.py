@@ -1,4 +1,4 @@
-"""Hooks of a task: checked during its registration, and read-only for those of users."""
+"""Wrappers of a task's hooks that check their results and protect their arguments."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from hrc_env.world import Effects, WorkerSignal
 
 @dataclass(slots=True)
 class Sizes:
-    """Lengths of the axes of a hook's result."""
+    """Sizes of the axes of a hook's result."""
 
     batch: int
     """Number of environments, B."""
     workers: int
     """Number of worker slots, W."""
     objects: int = 0
-    """Number of the task's loose objects, O; known once its scene is built."""
+    """Number of the task's loose objects, O, which is known after its scene has been built."""
 
 
 Check = Callable[[str, object, Sizes], None]
-"""Check of a result: (name for errors, result of a hook, sizes); it raises `ConfigError`."""
+"""Type of checks, which take (name for errors, result of a hook, sizes) and raise `ConfigError`."""
 
 
 def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
     """Return a copy of a task with hooks that check their results.
 
-    They raise `ConfigError` for results of another kind or shape, or that are no numbers.
+    The hooks raise `ConfigError` if a result has a wrong type or shape, or is not numeric.
     """
     kind = type(task)
     hooks = {name: _check_results(kind, name, check, sizes) for name, check in CHECKS.items()}
@@ -59,8 +59,8 @@ def _check_results(kind: TaskType, name: str, check: Check, sizes: Sizes) -> Cal
     Args:
         kind: class of the task.
         name: name of the hook.
-        check: check of its result.
-        sizes: lengths of the result's axes.
+        check: check of the hook's result.
+        sizes: sizes of the result's axes.
     """
     hook = getattr(kind, name)
 
@@ -116,7 +116,7 @@ def _check_points(name: str, points: object, sizes: Sizes) -> None:
 
 
 def _shape_of(value: object) -> tuple[int, ...]:
-    """Return the shape of an array; of anything else ()."""
+    """Return the shape of an array, or () for any other value."""
     return cast(NDArray[Any], value).shape if isinstance(value, np.ndarray) else ()
 
 
@@ -139,18 +139,18 @@ CHECKS: dict[str, Check] = {
     "markers": _check_points,
     "signal": _check_signal,
 }
-"""Checks of results, by hook."""
+"""Checks of results, by name of the hook."""
 WRITERS = ("reset", "set_goal", "advance")
-"""Methods that write their first argument, the state; all others only read it."""
+"""Hooks that write to their first argument, the state; all others only read it."""
 UNPROTECTED = ("make_state", "make_scene", "reach_targets", "counts")
-"""Methods without shared arrays among their arguments."""
+"""Hooks without shared arrays in their arguments."""
 
 
 def protect_arrays(task: AnyTask) -> AnyTask:
-    """Give read-only arrays to the methods that a user has written, and return the task.
+    """Make a task's user-defined methods receive read-only arrays, and return the task.
 
-    Such a method raises `ConfigError` if it writes into one of them, because others, a shield among
-    them, are given the same arrays.
+    Such a method raises `ConfigError` if it writes into one of them, because the arrays are shared
+    with other functions, such as shields.
     """
     for name in HOOKS:
         if name not in UNPROTECTED and is_of_user(getattr(type(task), name)):
@@ -166,7 +166,7 @@ def _pass_read_only(task: AnyTask, name: str) -> Callable[..., Any]:
     @wraps(hook)
     def function(*args: Any) -> Any:
         rest: list[Any] = [
-            arg if isinstance(arg, list) else read_only(arg)  # a list is of generators
+            arg if isinstance(arg, list) else read_only(arg)  # lists contain generators
             for arg in args[n_written:]
         ]
         return call_user_function(f"{task.id}: {name}", hook, *args[:n_written], *rest)

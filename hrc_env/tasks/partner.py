@@ -1,4 +1,4 @@
-"""The worker that takes part in a task, found among the estimated bodies."""
+"""Identification of the worker that takes part in a task, among the estimated bodies."""
 
 import numpy as np
 
@@ -9,25 +9,25 @@ from hrc_env.geometry.distances import least_separation, segments
 from hrc_env.world import FOOT_WORLD
 
 ARMS = ((6, 14), (7, 15))
-"""Forearm and hand of either side, among `geometry.distances.segments`."""
+"""Indices of forearm and hand of each side in `geometry.distances.segments`."""
 PARTNER_RADIUS_M = 0.6
-"""Horizontal distance of a trunk from the task's workplace within which the worker takes part [m].
-"""
+"""Horizontal distance between trunk and workplace within which a worker takes part in the task
+[m]."""
 
 
 def find_partner_arms(
     estimate: PoseEstimate, stand_xy_m: tuple[float, float], place_world: Capsules, within_m: float
 ) -> Bools:
-    """Return (B, W, S) the forearms and hands of each environment's partner that are near a place.
+    """Return a mask (B, W, S) of the partner's forearms and hands that are near a line segment.
 
-    The partner is the tracked worker at the task's workplace; of several it is the one with the
-    hand nearest to the place.
+    The partner is the tracked worker at the task's workplace; if there are several, it is the one
+    with the hand nearest to the segment.
 
     Args:
-        estimate: the workers.
-        stand_xy_m: workplace of the task, x and y from the robot's foot [m].
-        place_world: (B, 2, 3) end points of the segment where hands work [m].
-        within_m: distance of a hand from that segment within which its arm is returned [m].
+        estimate: estimate of the workers.
+        stand_xy_m: position of the task's workplace relative to the robot's base, x and y [m].
+        place_world: (B, 2, 3) end points of the line segment where hands work [m].
+        within_m: distance between hand and line segment within which an arm is included [m].
     """
     bodies, trunk = segments(estimate.mean_world), estimate.mean_world[:, :, TORSO, :2].mean(2)
     off_m = np.linalg.norm(trunk - (FOOT_WORLD[:2] + stand_xy_m), axis=-1)

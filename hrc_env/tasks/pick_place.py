@@ -1,4 +1,4 @@
-"""Pick and place: pieces of studs lie on a table, and belong into a rack on the other side."""
+"""Pick and place: move pieces of studs from a table to a rack on the other side of the robot."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,39 +20,40 @@ from hrc_env.worker.body import assets_dir
 from hrc_env.world import FOOT_WORLD, TaskScene, Workplace, World
 
 STUDS = 3
-"""Number of pieces."""
+"""Number of pieces of studs."""
 STUD_M = (0.038, 0.300, 0.089)
-"""Edges of a piece that stands on edge, along its x, y and z axes [m]."""
+"""Edge lengths of a piece along x, y and z when it stands on edge [m]."""
 STUD_KG = 0.5
 """Mass of a piece [kg]."""
 SURFACE_M = -0.02
-"""Height of table and rack above the robot's foot [m]."""
+"""Height of table and rack above the robot's base [m]."""
 ROW_AT_M = (0.34, -0.62)
-"""Middle of the row of pieces at the start, x and y from the robot's foot [m]."""
+"""Initial centre of the row of pieces relative to the robot's base, x and y [m]."""
 PLACES_M = tuple((x, 0.62, SURFACE_M + STUD_M[2] / 2) for x in (0.24, 0.36, 0.48))
-"""Middle of each piece that rests in its place, from the robot's foot [m]."""
+"""Target position of each piece's centre in the rack, relative to the robot's base [m]."""
 PLACES_WORLD = FOOT_WORLD + np.array(PLACES_M)
-"""(3, 3) middle of each piece that rests in its place [m]."""
+"""(3, 3) target position of each piece's centre in the rack [m, world]."""
 STACK = Workplace("stack", "task", (1.025, -0.62), np.pi, SURFACE_M, loads=("stud",) * 4)
-"""Place where the worker takes pieces from the other end of the table."""
+"""Workplace where the worker takes pieces from the other end of the table."""
 TRESTLE = Workplace("trestle", "bench", (2.10, -1.50), 0.0, SURFACE_M)
-"""Place where the worker lays these pieces down."""
+"""Workplace where the worker puts these pieces down."""
 ROW_M = 0.12
-"""Distance of neighbouring pieces in the row [m]."""
+"""Initial spacing of the pieces in the row [m]."""
 ASIDE_M = 0.02
-"""Largest shift of a piece along y at the start [m]."""
+"""Largest initial offset of a piece along y [m]."""
 TURN_RAD = 0.2
-"""Largest turn of a piece at the start [rad]."""
+"""Largest initial rotation of a piece [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedConfig:
-    """Criteria of a piece that rests in its place, let go."""
+    """Criteria for a piece that is placed: at rest in its target pose and released."""
 
     tolerance_m: float = 0.01
-    """Distance of a piece's middle from its place below which the piece is in place [m]."""
+    """Distance of a piece's centre from its target below which the piece is in position [m]."""
     tolerance_rad: float = 0.087
-    """Turn of a piece below which it is in place, 5 degrees [rad]."""
+    """Rotation of a piece from its target below which it is in position [rad]; 5 degrees by
+    default."""
     resting_m_s: float = 0.02
     """Speed of a piece below which it is at rest [m/s]."""
 
@@ -62,14 +63,14 @@ class PlacedConfig:
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceConfig(PlacedConfig):
-    """Criteria and rewards of placing pieces."""
+    """Criteria and rewards for placing pieces."""
 
     reward: str = "dense"
-    """"dense" rewards every metre of progress, too; "sparse" only pieces in their places."""
+    """Kind of reward: "sparse" rewards only placed pieces, "dense" also every metre of progress."""
     progress_per_m: float = 5.0
-    """Dense reward for every metre that pieces, and the tool, come nearer to their targets."""
+    """Dense reward for every metre by which pieces and tool approach their targets."""
     placed_bonus: float = 10.0
-    """Reward for a piece that is placed; taken off again if it leaves its place."""
+    """Reward for each piece that is placed; subtracted again if the piece leaves its target."""
 
     def __post_init__(self) -> None:
         PlacedConfig.__post_init__(self)
@@ -80,11 +81,11 @@ class PickPlaceState:
     """State of one environment's pieces."""
 
     poses: Annotated[Floats, (STUDS, 7)]
-    """Pose of each piece at the start: position [m, world] and quaternion (w, x, y, z)."""
+    """Initial pose of each piece: position [m, world] and quaternion (w, x, y, z)."""
     placed: Annotated[Bools, (STUDS,)]
-    """Whether each piece is in its place now."""
+    """Whether each piece is placed."""
     left_m: float
-    """Length of the ways that pieces and tool have before them [m]."""
+    """Remaining distance of pieces and tool to their targets, in total [m]."""
     dropped: bool
     """Whether a piece has fallen below the table."""
 
@@ -93,11 +94,11 @@ class PickPlaceStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining ways became shorter [m]."""
+    """Decrease of the remaining distance [m]."""
     placed: int
-    """Number of pieces that were placed in this step, less those that left their places."""
+    """Number of pieces that were placed in this step, minus those that left their targets."""
     done: bool
-    """Whether all pieces are in their places."""
+    """Whether all pieces are placed."""
 
 
 PICK_PLACE = dtype_of(PickPlaceState)
@@ -108,13 +109,13 @@ class PickPlaceView:
     """Knowledge of the robots about their task."""
 
     placed: Bools
-    """(B, 3) whether each piece rests in its place, let go."""
+    """(B, 3) whether each piece is at rest in its target pose and released."""
     places_world: Points3
-    """(3, 3) middle of each piece that rests in its place [m]."""
+    """(3, 3) target position of each piece's centre [m, world]."""
 
 
 def is_in_place(objects: ObjectState, config: PlacedConfig) -> Bools:
-    """Return (B, 3) whether each piece rests in its place, let go."""
+    """Return a mask (B, 3) of the pieces that are at rest in their target pose and released."""
     off_m = np.linalg.norm(objects.position_world - PLACES_WORLD, axis=-1)
     R = matrix(objects.quaternion_wxyz)
     least = np.cos(config.tolerance_rad)
@@ -124,11 +125,11 @@ def is_in_place(objects: ObjectState, config: PlacedConfig) -> Bools:
 
 
 def _measure_ways(studs_world: Points3, tool_world: Points3, placed: Bools) -> Floats:
-    """Return (B,) the length of the ways of pieces to their places and of the tool to a piece [m].
+    """Return the remaining distance (B,) of pieces to targets and of the tool to a piece [m].
 
     Args:
-        studs_world: (B, 3, 3) middles of the pieces [m].
-        tool_world: (B, 3) tool points of the robots, whose way is to the first unplaced piece [m].
+        studs_world: (B, 3, 3) centres of the pieces [m].
+        tool_world: (B, 3) tool points of the robots [m]; their target is the first unplaced piece.
         placed: (B, 3) whether each piece is placed.
     """
     away_m = np.linalg.norm(studs_world - PLACES_WORLD, axis=-1)
@@ -139,7 +140,7 @@ def _measure_ways(studs_world: Points3, tool_world: Points3, placed: Bools) -> F
 
 
 class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
-    """Take pieces of studs from a table that a worker also uses, and lay them into a rack."""
+    """Take pieces of studs from a table that a worker also uses, and place them in a rack."""
 
     id = "HRCPickPlace-v0"
     config_type = PickPlaceConfig
@@ -200,12 +201,12 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return make_records(PickPlaceState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return table, rack and pieces, and the two places of the worker."""
+        """Return table, rack and pieces, and the two workplaces of the worker."""
         mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
         return TaskScene(mjcf, (), (STACK, TRESTLE))
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Return the places of the pieces, which are gripped from above."""
+        """Return the target positions of the pieces, which are gripped from above."""
         down = (0.0, 0.0, -1.0)
         return [
             ReachTarget(f"the place of piece {k + 1}", place, down)
@@ -213,7 +214,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         ]
 
     def reset(self, state: Records1[PickPlaceState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Lay the pieces of environments `ids` out."""
+        """Draw the initial poses of the pieces in environments `ids`."""
         state[ids] = np.zeros((), PICK_PLACE)
         x, y = ROW_AT_M
         for b in map(int, ids):
@@ -236,7 +237,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
     def advance(
         self, state: Records1[PickPlaceState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[PickPlaceStep]:
-        """Judge the places of the pieces, and return (B,) the results of the step."""
+        """Evaluate the poses of the pieces, and return the results (B,) of the step."""
         objects = require(world.objects, "A loose object")
         step = make_records(PickPlaceStep, len(state))
         placed = is_in_place(objects, self.config)
@@ -250,15 +251,18 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return step
 
     def is_terminal(self, step: Records1[PickPlaceStep]) -> Bools | bool:
-        """Return (B,) whether all pieces are placed."""
+        """Return a mask (B,) of the environments in which all pieces are placed."""
         return step["done"]
 
     def view(self, state: Records1[PickPlaceState], ids: Ints) -> PickPlaceView:
-        """Return the placed pieces and the places of all pieces of environments `ids`."""
+        """Return the placed pieces and all target positions in environments `ids`."""
         return PickPlaceView(state["placed"][ids].copy(), PLACES_WORLD)
 
     def info(self, state: Records1[PickPlaceState]) -> dict[str, Floats]:
-        """Return how many pieces are placed and left, (B,) each; all placed is a success."""
+        """Return the numbers (B,) of placed and remaining pieces by name.
+
+        An episode is a success if all pieces are placed.
+        """
         placed = state["placed"].sum(1).astype(float)
         return {
             "task/studs_placed": placed,
@@ -268,5 +272,5 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         }
 
     def markers(self, view: PickPlaceView) -> Points3:
-        """Return the places (B, 3, 3) of the pieces in the rack [m]."""
+        """Return the target positions (B, 3, 3) of the pieces in the rack [m]."""
         return np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3))

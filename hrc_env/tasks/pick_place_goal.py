@@ -1,4 +1,4 @@
-"""Pick and place with goals kept apart from the observation, as hindsight replay needs it."""
+"""Pick and place with goals that are separate from the observation, for hindsight replay."""
 
 from dataclasses import dataclass
 
@@ -13,21 +13,21 @@ from hrc_env.tasks.pick_place import STUDS, PickPlace, PlacedConfig
 from hrc_env.tasks.task import AnyTask
 
 EACH = "each"
-"""Reward that counts each piece."""
+"""Kind of reward that counts each piece separately."""
 ALL = "all"
-"""Reward that counts only all pieces together."""
+"""Kind of reward that counts only whether all pieces are placed."""
 
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceGoalConfig(PlacedConfig):
-    """Criteria of placed pieces, for the reward and for a success."""
+    """Criteria for placed pieces, for the reward and for the success."""
 
     goal_m: float = 0.02
-    """Distance of a piece's middle, as measured, from its place below which the reward counts the
-    piece as placed [m]."""
+    """Measured distance of a piece's centre from its target below which the reward counts the piece
+    as placed [m]."""
     reward: str = EACH
-    """"each" is minus the share of pieces that are not placed, "all" is -1 until all are, then
-    0."""
+    """Kind of reward: "each" for minus the proportion of pieces that are not placed, "all" for -1
+    until all pieces are placed and then 0."""
 
     def __post_init__(self) -> None:
         PlacedConfig.__post_init__(self)
@@ -38,16 +38,16 @@ class PickPlaceGoalConfig(PlacedConfig):
 
 
 def reward_placing(achieved: Floats, desired: Floats, config: PickPlaceGoalConfig) -> Floats:
-    """Return (...) the reward for pieces at these places.
+    """Compute the reward (...) for positions of pieces.
 
     Args:
-        achieved: (..., 9) places of the three pieces [m].
-        desired: (..., 9) their targets [m].
-        config: radius `goal_m`, and whether pieces count one by one.
+        achieved: (..., 9) positions of the three pieces [m].
+        desired: (..., 9) target positions of the three pieces [m].
+        config: radius `goal_m` and kind of reward.
 
     Returns:
-        Minus the share of pieces that are farther from their targets than the radius, or -1 if any
-        is and `config.reward` is "all"; 0 if none is.
+        Minus the proportion of pieces that are farther than the radius from their targets; if
+        `config.reward` is "all", -1 if any piece is, and otherwise 0.
     """
     off = (achieved - desired).reshape(*achieved.shape[:-1], STUDS, 3)
     away = np.sqrt((off**2).sum(-1)) >= config.goal_m

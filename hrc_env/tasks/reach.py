@@ -19,16 +19,16 @@ from hrc_env.world import FOOT_M, World
 
 @dataclass(frozen=True, slots=True)
 class TargetConfig:
-    """Volume of the goals, and radius within which one is reached."""
+    """Volume of the goals, and radius within which a goal is reached."""
 
     radius_m: float = 0.05
     """Distance of the tool point from a goal below which the goal is reached [m]."""
     base_xy_world: tuple[float, float] = FOOT_M[:2]
-    """Axis of the robot's first joint, round which goals are drawn: x and y [m]."""
+    """Position of the robot's first joint axis, around which goals are drawn, x and y [m]."""
     distance_m: tuple[float, float] = (0.5, 0.95)
     """Range of the goals' horizontal distance from the axis of the robot's first joint [m]."""
     azimuth_rad: tuple[float, float] = (-1.2, 1.2)
-    """Range of the goals' direction from world +X, seen from the robot's first joint [rad]."""
+    """Range of the goals' azimuth from world +X about the robot's first joint [rad]."""
     height_m: tuple[float, float] = (0.8, 1.45)
     """Range of the goals' height above the floor [m]."""
 
@@ -43,12 +43,12 @@ class TargetConfig:
 
 @dataclass(frozen=True, slots=True)
 class ReachConfig(TargetConfig):
-    """Volume, time limit and rewards of the goals."""
+    """Volume of the goals, their time limit and their rewards."""
 
     time_limit_s: float = 4.0
-    """Time after which a goal that is not reached is missed, and the next one appears [s]."""
+    """Time after which a goal counts as missed, and the next one appears [s]."""
     progress_per_m: float = 10.0
-    """Reward for every metre that the tool comes nearer to its goal."""
+    """Reward for every metre by which the tool approaches its goal."""
     goal_bonus: float = 5.0
     """Reward for reaching a goal."""
 
@@ -61,11 +61,11 @@ class ReachState:
     """State of one environment's goals."""
 
     goal_world: Annotated[Points3, (3,)]
-    """Place of the present goal [m]."""
+    """Position of the present goal [m]."""
     goal_age_s: float
-    """Time since it appeared [s]."""
+    """Time since the present goal appeared [s]."""
     distance_m: float
-    """Distance of the tool point from it [m]."""
+    """Distance of the tool point from the present goal [m]."""
     n_reached: int
     """Number of goals that were reached in this episode."""
     n_missed: int
@@ -76,11 +76,11 @@ class ReachStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the tool came nearer to the goal that it had [m]."""
+    """Decrease of the distance from the goal [m]."""
     reached: bool
-    """Whether that goal was reached in this step."""
+    """Whether the goal was reached in this step."""
     missed: bool
-    """Whether its time limit ran out in this step."""
+    """Whether the goal's time limit expired in this step."""
 
 
 REACH = dtype_of(ReachState)
@@ -92,9 +92,9 @@ class ReachView:
     """Knowledge of the robots about their task."""
 
     goal_world: Points3
-    """(B, 3) place of the present goal [m]."""
+    """(B, 3) position of the present goal [m]."""
     time_left_s: Floats
-    """(B,) time until it is missed [s]."""
+    """(B,) remaining time until the present goal is missed [s]."""
 
 
 @kernel
@@ -106,15 +106,15 @@ def _judge_goals(
     states: Records1[ReachState],
     steps: Records1[ReachStep],
 ) -> bool:
-    """Advance the goals by one control step, and return whether any of them is reached or missed.
+    """Advance the goals by one control step, and return whether any was reached or missed.
 
     Args:
         tool_world: (B, 3) tool points of the robots [m].
         dt_s: duration of the step [s].
         radius_m: distance below which a goal is reached [m].
-        time_limit_s: age from which on a goal is missed [s].
-        states: (B,) of which all but `goal_world` is written.
-        steps: (B,) written.
+        time_limit_s: age at which a goal is missed [s].
+        states: (B,) states, in which all fields except `goal_world` are written.
+        steps: (B,) output, which is filled.
     """
     any_done = False
     for b in range(len(states)):
@@ -135,7 +135,7 @@ def _judge_goals(
 
 
 MIDDLE = "the middle of its goals"
-"""Name of the second place that `list_targets` returns."""
+"""Name of the second target that `list_targets` returns."""
 
 
 def _draw_goals(
@@ -144,10 +144,10 @@ def _draw_goals(
     """Draw a new goal for each of environments `ids`.
 
     Args:
-        state: of all environments; rows `ids` are written.
-        ids: (n,) the environments in question.
-        rngs: a generator for each environment of the batch.
-        tool_world: (n, 3) tool points of the robots in question [m].
+        state: state of all environments; rows `ids` are written.
+        ids: (n,) indices of the environments.
+        rngs: random generators, one for each environment of the batch.
+        tool_world: (n, 3) tool points of the robots in these environments [m].
         config: volume of the goals.
     """
     for b, tool in zip(map(int, ids), tool_world.tolist(), strict=True):
@@ -158,9 +158,9 @@ def _draw_goals(
 
 
 def list_targets(config: TargetConfig) -> list[ReachTarget]:
-    """Return the places of the nearest goal and of the middle of all goals.
+    """Return the positions of the nearest goal and of the centre of the goal volume as targets.
 
-    A robot that is too short for the middle cannot reach most of them.
+    A robot that cannot reach the centre cannot reach most of the goals.
     """
     (x, y), (near_m, far_m) = config.base_xy_world, config.distance_m
     (left, right), (low_m, high_m) = config.azimuth_rad, config.height_m
@@ -176,10 +176,10 @@ def list_targets(config: TargetConfig) -> list[ReachTarget]:
 
 
 def make_target(goal: Floats, config: TargetConfig) -> ReachTarget:
-    """Return the place of a goal that a user gives.
+    """Return the position of a user-defined goal as a target.
 
     Raises:
-        ConfigError: it is no place (x, y, z) above the floor.
+        ConfigError: the goal is not a position (x, y, z) above the floor.
     """
     place = np.asarray(goal, float)
     if place.shape != (3,) or not np.isfinite(place).all() or place[2] < 0.0:
@@ -191,7 +191,7 @@ def make_target(goal: Floats, config: TargetConfig) -> ReachTarget:
 
 
 def draw_goal(rng: np.random.Generator, config: TargetConfig) -> Vector3:
-    """Draw the place of a goal in the world frame [m]."""
+    """Draw the position of a goal in the world frame [m]."""
     x, y = config.base_xy_world
     limits = config.distance_m, config.azimuth_rad, config.height_m
     distance_m, azimuth_rad, z = (
@@ -270,11 +270,11 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         return make_records(ReachState, batch)
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Return the places of the goal volume that the tool has to reach."""
+        """Return the positions in the goal volume that the tool must be able to reach."""
         return list_targets(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
-        """Return the place (3,) of the first goal of the episode [m, world]."""
+        """Return the position (3,) of the episode's first goal as a target [m, world]."""
         return [make_target(goal, self.config)]
 
     def set_goal(self, state: Records1[ReachState], ids: Ints, goals: Floats, world: World) -> None:
@@ -291,7 +291,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
     def advance(
         self, state: Records1[ReachState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[ReachStep]:
-        """Judge the goals, replace those that are done, and return (B,) the results of the step."""
+        """Evaluate the goals, replace finished ones, and return the results (B,) of the step."""
         tool_world, step = world.robot.tool_world, make_records(ReachStep, len(state))
         radius_m, time_limit_s = self.config.radius_m, self.config.time_limit_s
         if _judge_goals(tool_world, dt_s, radius_m, time_limit_s, state, step):
@@ -300,15 +300,15 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         return step
 
     def view(self, state: Records1[ReachState], ids: Ints) -> ReachView:
-        """Return the goals of environments `ids` and the time left to reach them."""
+        """Return the goals of environments `ids` and the remaining time to reach them."""
         return ReachView(
             state["goal_world"][ids], self.config.time_limit_s - state["goal_age_s"][ids]
         )
 
     def info(self, state: Records1[ReachState]) -> dict[str, Floats]:
-        """Return the numbers of goals that were reached and missed, (B,) each.
+        """Return the numbers (B,) of reached and missed goals by name.
 
-        An episode is a success if every goal, and at least one, was reached in time.
+        An episode is a success if at least one goal was reached and none was missed.
         """
         succeeded = (state["n_reached"] > 0) & (state["n_missed"] == 0)
         return {
@@ -318,5 +318,5 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         }
 
     def markers(self, view: ReachView) -> Points3:
-        """Return the goal (B, 1, 3) [m]."""
+        """Return the positions (B, 1, 3) of the present goals [m]."""
         return view.goal_world[:, None]

@@ -1,4 +1,4 @@
-"""Reach a single goal that is kept apart from the observation, as hindsight replay needs it."""
+"""Reach a single goal that is separate from the observation, for hindsight replay."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -17,16 +17,16 @@ from hrc_env.world import World
 
 @dataclass(frozen=True, slots=True)
 class ReachGoalConfig(TargetConfig):
-    """Volume of the goal, and radius within which it is reached."""
+    """Volume of the goals, and radius within which a goal is reached."""
 
 
 class ReachGoalState:
     """State of one environment's goal."""
 
     goal_world: Annotated[Points3, (3,)]
-    """Place of the goal [m]."""
+    """Position of the goal [m]."""
     there: bool
-    """Whether the tool point is within the goal's radius now."""
+    """Whether the tool point is within the goal's radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +34,11 @@ class ReachGoalView:
     """Knowledge of the robots about their task."""
 
     goal_world: Points3
-    """(B, 3) place of the goal [m]."""
+    """(B, 3) position of the goal [m]."""
 
 
 def reward_reaching(achieved: Floats, desired: Floats, config: ReachGoalConfig) -> Floats:
-    """Return (...) 0 where places (..., 3) are nearer to each other than the radius, else -1."""
+    """Return the reward (...): 0 if positions (..., 3) are within the radius of goals, else -1."""
     off_m = np.sqrt(((achieved - desired) ** 2).sum(-1))
     return np.where(off_m < config.radius_m, 0.0, -1.0)
 
@@ -70,11 +70,11 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         return make_records(ReachGoalState, batch)
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Return the places of the goal volume that the tool has to reach."""
+        """Return the positions in the goal volume that the tool must be able to reach."""
         return list_targets(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
-        """Return the place (3,) of the goal of the episode [m, world]."""
+        """Return the position (3,) of the episode's goal as a target [m, world]."""
         return [make_target(goal, self.config)]
 
     def set_goal(
@@ -85,7 +85,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         state["there"][ids] = self._is_there(world.robot.tool_world, goals)
 
     def reset(self, state: Records1[ReachGoalState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Give environments `ids` a goal each."""
+        """Draw the goal of each of environments `ids`."""
         for b, tool_world in zip(map(int, ids), world.robot.tool_world, strict=True):
             goal_world = np.array(draw_goal(rngs[b], self.config))
             state["goal_world"][b] = goal_world
@@ -94,12 +94,12 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
     def advance(
         self, state: Records1[ReachGoalState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[ReachGoalState]:
-        """Judge the place of the tool, and return a copy of the state."""
+        """Evaluate the position of the tool, and return a copy of the state."""
         state["there"] = self._is_there(world.robot.tool_world, state["goal_world"])
         return state.copy()
 
     def _is_there(self, tool_world: Points3, goal_world: Points3) -> Bools:
-        """Return (...) whether tool points (..., 3) are within the radius of goals (..., 3)."""
+        """Return a mask (...) of the tool points (..., 3) within the radius of goals (..., 3)."""
         return reward_reaching(tool_world, goal_world, self.config) == 0.0
 
     def view(self, state: Records1[ReachGoalState], ids: Ints) -> ReachGoalView:
@@ -107,7 +107,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         return ReachGoalView(state["goal_world"][ids])
 
     def info(self, state: Records1[ReachGoalState]) -> dict[str, Floats]:
-        """Return whether the tool is at its goal now, (B,) each; its last place decides."""
+        """Return whether the tool is at its goal (B,) by name; its final position counts."""
         there = state["there"].astype(float)
         return {
             "task/goals_reached": there,
@@ -116,5 +116,5 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         }
 
     def markers(self, view: ReachGoalView) -> Points3:
-        """Return the goal (B, 1, 3) [m]."""
+        """Return the positions (B, 1, 3) of the goals [m]."""
         return view.goal_world[:, None]

@@ -1,4 +1,4 @@
-"""The base class of tasks with its hooks, and the register of tasks by id."""
+"""The base class of tasks with its hooks, and the registry of tasks by ID."""
 
 from collections.abc import Collection, Mapping, Sequence
 from importlib import import_module
@@ -26,34 +26,36 @@ StateT = TypeVar("StateT")
 
 
 class Task(Generic[ConfigT, StateT]):
-    """A task of the robot: derive from this class, and register yours (`register_task`).
+    """Base class of the robot's tasks; custom tasks derive from it (see `register_task`).
 
     The first paragraph of a subclass's docstring describes the task. A subclass must define `id`,
     `config_type`, `achieved`, `failed`, and the methods `make_state`, `reset`, `advance`, `view`
     and `info`; the other attributes (docs/reference/declarations.md) and methods have defaults.
 
     All methods work on a batch of environments. `state` is a structured array, or a dataclass of
-    arrays, with a row for every environment; `ids` are the rows in question, all rows where a
-    method has no such argument. `rngs` holds a generator for every environment of the batch, and
-    events in environment b draw from `rngs[b]` only. Methods write into `state` in `reset`,
-    `set_goal` and `advance`, and only read their other arguments. `world` is the true state of the
-    robot, its hand and the objects. B is the number of environments in question, O of the task's
-    loose objects, W of worker slots, N of robot joints.
+    arrays, with a row for every environment; `ids` are the indices of the rows to process. A method
+    without `ids` processes all rows. `rngs` holds a random generator for every environment of the
+    batch, and events in environment b draw only from `rngs[b]`. `reset`, `set_goal` and `advance`
+    write into `state`; all other arguments are read-only. `world` is the true state of the robot,
+    its hand and the objects. In shapes, B is the number of processed environments, O that of the
+    task's loose objects, W that of worker slots, and N that of robot joints.
 
     Args:
         config: settings of the task, of `config_type`; None for the defaults.
     """
 
     id: ClassVar[str] = ""
-    """Id of the task in `gymnasium.make`, such as "HRCReach-v0"."""
+    """ID of the task in `gymnasium.make`, such as "HRCReach-v0"."""
     config_type: ClassVar[type[Any]]
-    """Frozen dataclass of the task's settings, each with a default: `config={"task": {...}}`."""
+    """Frozen dataclass of the task's settings, all with defaults; set by `config={"task":
+    {...}}`."""
     observations: ClassVar[tuple[ObservationTerm, ...]] = ()
-    """The task's terms of the observation; their functions read `Belief.task`."""
+    """Observation terms of the task; their functions can read `Belief.task`."""
     rewards: ClassVar[tuple[RewardTerm, ...]] = ()
-    """The task's terms of the reward; their functions are given the task's settings as weights."""
+    """Reward terms of the task; their functions receive the task's settings as weights."""
     achieved: ClassVar[str] = ""
-    """Name in `info` of the number of successful attempts; "success" in tables is their share."""
+    """Name in `info` of the number of successful attempts; "success" in tables is their
+    proportion."""
     failed: ClassVar[str] = ""
     """Name in `info` of the number of failed attempts."""
     starts: ClassVar[str] = ""
@@ -71,20 +73,20 @@ class Task(Generic[ConfigT, StateT]):
     scene: ClassVar[str] = "lab"
     """Name of the default scene."""
     n_workers: ClassVar[int | tuple[int, int]] = 1
-    """Default number of workers, or the fewest and the most of an episode."""
+    """Default number of workers, or the bounds (fewest, most) on the number in an episode."""
     viewpoint: ClassVar[str] = "beside"
     """Viewpoint of pictures, one of `scene.render.VIEWPOINTS`."""
     defaults: ClassVar[Mapping[str, Any]] = {}
-    """Values of `HRCConfig` that differ from its defaults, nested as `config=` takes them."""
+    """Settings that differ from the defaults of `HRCConfig`, as a nested mapping like `config=`."""
     goal: ClassVar[Goal | None] = None
-    """Goal that is kept apart from the observation, as hindsight replay (HER) needs it; None for
-    a task without."""
+    """Goal that is separate from the observation, as required by hindsight experience replay (HER);
+    None for a task without such a goal."""
 
     config: ConfigT
     """Settings of the task."""
 
     def __new__(cls, *args: Any, **kwargs: Any) -> "Task[ConfigT, StateT]":
-        """Refuse to make an instance of the base class.
+        """Raise an error if an instance of the base class itself is made.
 
         Raises:
             ConfigError: the class is `Task` itself.
@@ -108,10 +110,10 @@ class Task(Generic[ConfigT, StateT]):
         """Begin new episodes of environments `ids`.
 
         Args:
-            state: of all environments; rows `ids` are written.
-            ids: (n,) the environments in question.
-            rngs: a generator for every environment of the batch.
-            world: of these environments only.
+            state: state of all environments; rows `ids` are written.
+            ids: (n,) indices of the environments.
+            rngs: random generators, one for every environment of the batch.
+            world: true state of the environments `ids`.
         """
         raise NotImplementedError
 
@@ -119,84 +121,88 @@ class Task(Generic[ConfigT, StateT]):
         """Advance every environment by one control step.
 
         Args:
-            state: (B,) written.
-            rngs: B generators.
-            world: the environments at the end of the step.
+            state: (B,) state, which is updated.
+            rngs: B random generators.
+            world: true state of the environments at the end of the step.
             dt_s: duration of the step [s].
 
         Returns:
-            The results of the step, of a type of the task's own; reward terms and `is_terminal`
-            are given them.
+            The result of the step, of any type, which is passed to reward terms and `is_terminal`.
         """
         raise NotImplementedError
 
     def view(self, state: StateT, ids: Ints) -> Any:
-        """Return the knowledge of the robots of environments `ids` about their task.
+        """Return the robots' knowledge about their task in environments `ids`.
 
-        It is `Belief.task`, of a type of the task's own.
+        It is available as `Belief.task`, and may be of any type.
         """
         raise NotImplementedError
 
     def info(self, state: StateT) -> Mapping[str, Floats]:
-        """Return numbers (B,) about the episode until now, by name.
+        """Return values (B,) about the current episode by name.
 
-        Names begin with "task/", except for "is_success": 1 if the episode would be a success if it
-        ended now, else 0.
+        Names begin with "task/", except for "is_success", which is 1 if the episode would be a
+        success if it ended now, and otherwise 0.
         """
         raise NotImplementedError
 
     def is_terminal(self, step: Any) -> Bools | bool:
-        """Return (B,) whether the task is over after a step; by default it never is.
+        """Return a mask (B,) of environments in which the task ends the episode; none by default.
 
         Args:
-            step: results of the step, as `advance` returned them.
+            step: result of the step, as returned by `advance`.
         """
         return False
 
     def markers(self, view: Any) -> Points3:
-        """Return (B, M, 3) points that pictures show, of a `view` [m, world]; by default none."""
+        """Return points (B, M, 3) of a `view` to show in pictures [m, world]; none by default."""
         return np.zeros((1, 0, 3))
 
     def survey(self, grounds: Grounds) -> Any:
-        """Return the task's own map of a place, made once: `World.place`; by default None.
+        """Compute the task's map of the scene, which becomes `World.place`; None by default.
+
+        The method is called once, when the environment is made.
 
         Raises:
-            ConfigError: the place has no room for the task.
+            ConfigError: the scene lacks the space for the task.
         """
         return None
 
     def draw_start(
         self, rngs: Rngs, place: Any, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """Draw the joint angles (n, N) with which n robots start [rad, m of slides].
+        """Draw the initial joint positions (n, N) of n robots [rad, or m for slides].
+
+        By default, they are near the home pose.
 
         Args:
-            rngs: n generators, one for each robot.
-            place: the map that `survey` returned.
-            home_q: (N,) the robot's home pose; by default starts are near it.
-            spread_rad: (N,) largest distance of a start from the home pose.
+            rngs: n random generators, one for each robot.
+            place: map that `survey` returned.
+            home_q: (N,) home pose of the robot.
+            spread_rad: (N,) largest deviation of each joint from the home pose.
         """
         return draw_near(home_q, spread_rad, rngs)
 
     def make_scene(self) -> TaskScene:
-        """Return the task's part of the scene; by default it is empty."""
+        """Return the task's part of the scene; empty by default."""
         return NOTHING
 
     def reach_targets(self) -> Sequence[ReachTarget]:
-        """Return places that the tool has to reach, besides loose objects; by default none.
+        """Return targets that the tool has to reach, in addition to loose objects; none by default.
 
-        A robot that is too short for them is refused.
+        A robot that cannot reach them is rejected.
         """
         return ()
 
     def goal_targets(self, goal: Floats) -> Sequence[ReachTarget]:
-        """Return the places that the tool has to reach for `reset(options={"goal": ...})`.
+        """Return the targets that the tool has to reach for `reset(options={"goal": ...})`.
 
-        A task that takes goals defines this method and `set_goal`. It is called before the episode
-        starts, and a goal out of reach is refused.
+        A task that accepts goals defines this method and `set_goal`. The method is called before
+        the episode starts, and a goal out of reach is rejected.
 
         Raises:
-            ConfigError: this is no goal; by default always, as the task takes none.
+            ConfigError: the goal is invalid; always raised by default, because the task accepts no
+                goals.
         """
         ids = dict.fromkeys((*BUILT_IN, *TASKS))
         known = [task for task in ids if takes_goals(find_task(task))]
@@ -209,44 +215,44 @@ class Task(Generic[ConfigT, StateT]):
         """Replace the goals that `reset` drew for environments `ids`.
 
         Args:
-            state: of all environments; rows `ids` are written.
-            ids: (n,) the environments in question.
-            goals: (n, ...) the new goals, in the form that `goal_targets` takes.
-            world: of these environments only.
+            state: state of all environments; rows `ids` are written.
+            ids: (n,) indices of the environments.
+            goals: (n, ...) new goals, in the form that `goal_targets` accepts.
+            world: true state of the environments `ids`.
         """
         raise NotImplementedError
 
     def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
-        """Return (n, O, 7) the poses of loose objects after `reset`.
+        """Return the poses (n, O, 7) of loose objects after `reset`.
 
-        A pose is a position [m, world] and a quaternion (w, x, y, z). None, the default, stands for
-        the poses of the MJCF.
+        A pose is a position [m, world] and a quaternion (w, x, y, z). The default, None, keeps the
+        poses of the MJCF.
         """
         return None
 
     def is_load(self, state: StateT) -> Bools | bool:
-        """Return (B, O) whether each object counts as part of the robot while it holds it.
+        """Return a mask (B, O) of the objects that count as part of the robot while they are held.
 
-        It does so in cost, separation and belief; by default all objects do.
+        They count in cost, separation and belief. By default, all objects do.
         """
         return True
 
     def signal(self, state: StateT) -> WorkerSignal | None:
         """Return the signal to workers that wait for the task (`Job.waits`).
 
-        None, the default, stands for workers that do not wait.
+        The default, None, is for tasks without waiting workers.
         """
         return None
 
     def effects(self, state: StateT) -> Effects | None:
-        """Return the task's forces and welds on loose objects in the next step; by default none."""
+        """Return the task's forces and welds on loose objects in the next step; none by default."""
         return None
 
     def allowed_contact(self, belief: Belief) -> Bools | None:
-        """Return (B, W, S) whether each segment of estimated bodies may touch the robot's hand.
+        """Return a mask (B, W, S) of the estimated body segments that may touch the robot's hand.
 
         Built-in shields permit these contacts, so that workers can take an object from the robot.
-        None, the default, stands for no segment.
+        The default, None, permits no contact.
         """
         return None
 
@@ -257,27 +263,27 @@ class Task(Generic[ConfigT, StateT]):
 
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
-        """All terms of the observation in their order: robot, task, workers."""
+        """All terms of the observation, in the order robot, task, workers."""
         slides = observations.SLIDE_TERMS if self.needs_mobile_base else ()
         return (*observations.ROBOT_TERMS, *slides, *self.observations, *observations.SHARED_TERMS)
 
     @property
     def own_rewards(self) -> tuple[RewardTerm, ...]:
-        """The task's terms of the reward; the goal's is the first, if there is one."""
+        """Reward terms of the task, beginning with the goal's term if there is a separate goal."""
         return (*reward_terms(self.goal), *self.rewards)
 
     @property
     def reward_terms(self) -> tuple[RewardTerm, ...]:
-        """All terms of the reward: the task's, and those that every task shares."""
+        """All terms of the reward: those of the task, then those that all tasks share."""
         return (*self.own_rewards, *rewards.SHARED_TERMS)
 
     @property
     def can_end(self) -> bool:
-        """Whether the task ends episodes before their time limit."""
+        """Whether the task may end episodes before their time limit."""
         return overrides(type(self), "is_terminal")
 
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the counts of attempts in an info by a readable name.
+        """Return the numbers of attempts in an info by readable names.
 
         An example is {"goals reached": 3.0, "goals missed": 1.0}.
         """
@@ -286,13 +292,13 @@ class Task(Generic[ConfigT, StateT]):
 
 
 AnyTask: TypeAlias = Task[Any, Any]
-"""A task with any settings and any state."""
+"""Type of a task with any settings and any state."""
 TaskType: TypeAlias = type[AnyTask]
-"""A class of tasks."""
+"""Type of a task class."""
 TASKS: Registry[TaskType] = Registry("task")
-"""Task classes by id: the registered ones, and those of the package that have been imported."""
+"""Task classes by ID: registered ones, and built-in ones that have been imported."""
 HOOKS = [name for name, _ in getmembers(Task, isfunction) if name[0] != "_"]
-"""Names of the methods that a subclass may define."""
+"""Names of the methods that a subclass may override."""
 
 
 def is_task_class(value: object) -> TypeGuard[TaskType]:
@@ -301,7 +307,7 @@ def is_task_class(value: object) -> TypeGuard[TaskType]:
 
 
 def overrides(task: TaskType, name: str) -> bool:
-    """Return whether a class defines a method of `Task` of its own."""
+    """Return whether a class overrides a method of `Task`."""
     return getattr(task, name) is not getattr(Task, name)
 
 
@@ -309,7 +315,7 @@ def find_task(task: str | TaskType) -> TaskType:
     """Return the class of a task.
 
     Args:
-        task: its id, or the class itself.
+        task: ID of the task, or its class.
 
     Raises:
         ConfigError: there is no such task; the error names all tasks.
@@ -329,7 +335,7 @@ def find_task(task: str | TaskType) -> TaskType:
 
 
 def is_known(task: TaskType) -> bool:
-    """Return whether a class is a task of the package or a registered one."""
+    """Return whether a class is a built-in or a registered task."""
     if task.id in BUILT_IN and find_task(task.id) is task:
         return True
     return TASKS.name_of(task) is not None
@@ -338,19 +344,19 @@ def is_known(task: TaskType) -> bool:
 def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
     """Return a copy of a task with additional terms of the reward.
 
-    It is a subclass, as you may write one yourself: `class Mine(hrc_env.find_task(ID))` with an
-    `id` and `rewards = (*hrc_env.find_task(ID).rewards, term)`. Terms about people read the belief,
-    `Belief.estimate` and `Belief.separation`; they are given the task's settings as weights, and
-    their values stand in `info` as "reward/NAME". `register_task` makes the id known.
+    The copy is equivalent to a subclass `class Mine(hrc_env.find_task(ID))` with an `id` and
+    `rewards = (*hrc_env.find_task(ID).rewards, term)`. Terms about people read `Belief.estimate`
+    and `Belief.separation`; they receive the task's settings as weights, and `info` contains their
+    values as "reward/NAME". Call `register_task` to make an environment of the copy by its ID.
 
     Args:
-        task: id or class of the task to be copied.
-        terms: additional terms; each returns (B,) a number for every environment.
-        id: id of the new task, such as "MyReach-v0".
+        task: ID or class of the task to copy.
+        terms: additional terms; each returns an array (B,) with a value for every environment.
+        id: ID of the new task, such as "MyReach-v0".
 
     Raises:
-        ConfigError: there is no such task, no term, one that is no `RewardTerm`, or one whose name
-            the task or all tasks have.
+        ConfigError: the task is unknown, no term is given, a term is not a `RewardTerm`, or its
+            name is already used by a term of the task.
     """
     base = find_task(task)
     if not terms:
@@ -369,16 +375,16 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
 
 
 def ancestor_of(task: str, ids: Collection[str]) -> str:
-    """Return the nearest task among `ids` with agents that also act in a task, or its own id.
+    """Return the ID of a task with agents that can also act in a given task.
 
-    It is the task itself, or one that it derives from with the same observations and goals, as
-    `with_rewards` makes them.
+    It is the task itself or its closest base class with the same observations and goals, as of
+    tasks made by `with_rewards`. If there is none among `ids`, return the ID of the task itself.
 
     Args:
-        task: id of the task in question.
-        ids: ids of the tasks that have agents.
+        task: ID of the task.
+        ids: IDs of the tasks that have agents.
     """
-    if task not in (*BUILT_IN, *TASKS):  # a class that is not registered
+    if task not in (*BUILT_IN, *TASKS):  # class is not registered
         return task
     kind = find_task(task)
     for base in kind.__mro__:
@@ -391,7 +397,7 @@ def ancestor_of(task: str, ids: Collection[str]) -> str:
 
 
 def takes_goals(task: TaskType) -> bool:
-    """Return whether a reset can give a task its goal."""
+    """Return whether the goal of a task can be set by options of a reset."""
     return overrides(task, "set_goal")
 
 
