@@ -156,7 +156,7 @@ def test_one_entry_of_one_environment_that_is_no_number_is_enough():
         seen[-1, 1] = np.nan
         return seen
 
-    with pytest.raises(FloatingPointError, match=r"not a number: station\.$"):
+    with pytest.raises(FloatingPointError, match=r"not finite numbers: station\.$"):
         HRCVectorEnv(2, task=vary(TASKS[TASK], view=view), perception="none")
 
 

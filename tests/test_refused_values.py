@@ -131,7 +131,7 @@ def test_a_term_with_other_entries_than_it_says_is_told(name, n_first, n_second)
 def test_one_entry_that_is_no_number_is_told_with_its_term(at, said):
     physical = np.zeros((2, 3))
     physical[at] = np.nan
-    with pytest.raises(FloatingPointError, match=rf"not a number: {said}\.$"):
+    with pytest.raises(FloatingPointError, match=rf"not finite numbers: {said}\.$"):
         seen(physical[:, :1], physical[:, 1:])
 
 

@@ -79,5 +79,5 @@ def test_an_arm_that_is_too_short_for_most_goals_is_refused(size, fits):
         if fits:
             check_reach(task, "short", short, [middle])
         else:
-            with pytest.raises(ConfigError, match=r"the middle of its goals at .* out of reach"):
+            with pytest.raises(ConfigError, match=r"the center of its goals at .* out of reach"):
                 check_reach(task, "short", short, [middle])

@@ -254,7 +254,7 @@ def _walks(simulation) -> bool:
         ({"control": "tool"}, 'valid is control="joint"'),
         ({"control": "twist"}, 'valid is control="joint"'),
         ({"robot": "ur10e_like"}, "a robot that drives, and 'ur10e_like' .* 'mobile_base'"),
-        ({"config": {"task": {"way_m": (30.0, 40.0)}}}, "a way of 30 to 40 m"),
+        ({"config": {"task": {"way_m": (30.0, 40.0)}}}, "a path of 30 to 40 m"),
         ({"config": {"task": {"way_m": (8.0, 4.0)}}}, r"\(low, high\)"),
         ({"config": {"task": {"reward": "some"}}}, '"dense" or "sparse"'),
         ({"config": {"task": {"zone_m": 0.0}}}, "zone_m"),

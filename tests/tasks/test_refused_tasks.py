@@ -230,7 +230,7 @@ def test_a_place_for_deliveries_has_one_way_that_is_as_long_as_is_asked():
         (longest + tiny, longest + 1.0), (0.5 * shortest, shortest - tiny),
         (below + tiny, above - tiny),
     ):  # fmt: skip
-        said = rf"here are {len(lengths)} zones, and the longest way is {longest:.1f} m"
+        said = rf"has {len(lengths)} zones, and its longest path is {longest:.1f} m"
         with pytest.raises(ConfigError, match=said):
             Delivery(DeliveryConfig(way_m=refused)).survey(grounds)
 
@@ -247,5 +247,5 @@ def test_ways_between_zones_are_those_that_are_looked_up_there():
 def test_a_place_without_zones_has_no_ways():
     grounds = build(name="site", robot="mobile_base").map
     full = replace(grounds, blocked=np.array([[0.0, 0.0, 99.0, 99.0, 0.0]]))
-    with pytest.raises(ConfigError, match=r"here are 0 zones, and the longest way is 0\.0 m"):
+    with pytest.raises(ConfigError, match=r"has 0 zones, and its longest path is 0\.0 m"):
         Delivery().survey(full)
