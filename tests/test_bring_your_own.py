@@ -98,7 +98,7 @@ BAD = {
         {"id": "HRCTend-v1", "markers": None},
         "markers must be a method",
     ),
-    "an id that is taken": ({}, "There is the task 'HRCTend-v0' already"),
+    "an id that is taken": ({}, "The task 'HRCTend-v0' exists already"),
     "an id that is none": ({"id": "tend"}, "must be like"),
     "no function": ({"id": "HRCTend-v1", "advance": None}, "advance must be a method"),
     "settings without defaults": (
@@ -219,7 +219,7 @@ def test_a_function_that_makes_an_estimator_is_one():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "There is the estimator 'dlt_kalman' already"),
+        ({}, "The estimator 'dlt_kalman' exists already"),
         ({"make": lambda P, dt_s, config: object()}, "lacks init, reset, predict"),
         ({"config": dict}, "must be a kind of TrackerConfig"),
         ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),
@@ -308,12 +308,12 @@ def stepped(**arguments):
 @pytest.mark.parametrize(
     ("register", "given", "said"),
     [
-        (hrc_env.register_shield, ("slow_down", print), "the shield 'slow_down' already"),
+        (hrc_env.register_shield, ("slow_down", print), "shield 'slow_down' exists already"),
         (hrc_env.register_shield, ("other", None), "must be a function"),
         (
             hrc_env.register_detector,
             ("mirrored", print),
-            "the detector 'mirrored' already",
+            "detector 'mirrored' exists already",
         ),
         (hrc_env.register_detector, ("other", None), "must be a function"),
     ],
@@ -427,7 +427,7 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "the robot 'swing_arm' already"),
+        ({}, "robot 'swing_arm' exists already"),
         ({"mjcf": "<mujoco><"}, "cannot be used"),
         ({"mjcf": "nowhere.xml"}, "cannot be used"),
         ({"tool_site": "top"}, "no site 'top'"),

@@ -258,7 +258,7 @@ def test_joints_that_are_no_arms_are_named():
 @pytest.mark.parametrize("render_mode", [None, "depth_array"])
 def test_an_overlay_that_nothing_shows_is_warned_of(render_mode):
     made = {"perception": "none", "overlay": "capsules"}
-    with pytest.warns(UserWarning, match="is drawn in pictures of render_mode='rgb_array' only"):
+    with pytest.warns(UserWarning, match="requires render_mode='rgb_array'"):
         hrc_env.HRCVectorEnv(1, render_mode=render_mode, **made).close()
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -115,7 +115,7 @@ def test_hindsight_is_for_goals():
     ("words", "says"),
     [
         (["--algorithm", "sac", "--her", "True"], "HRCReach-v0 has no goals apart from"),
-        (["--her", "True"], "ppo has no such buffer"),
+        (["--her", "True"], "ppo has no replay buffer"),
         (["--algorithm", "scac"], "Did you mean 'sac'"),
         (["--demonstrations", "-1"], "--demonstrations must be 0 or more"),
         (["--timesteps", "0"], "--timesteps must be 1 or more"),

@@ -244,7 +244,7 @@ def test_an_activation_that_nobody_knows_is_refused():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["RUN", "--name", "Tiny"], "takes small letters, digits and _"),
+        (["RUN", "--name", "Tiny"], "must consist of lowercase letters, digits and _"),
         (["RUN", "--name", "tiny"], "exists already; give another --name"),
         (["nowhere", "--name", "tiny"], "holds no run"),
         (["RUN", "--name", "tiny", "--episodes", "0"], "--episodes must be 1 or more"),

@@ -11,7 +11,7 @@ from hrc_env.env_words import EnvironmentArguments
 
 @dataclass(frozen=True, kw_only=True)
 class List(EnvironmentArguments):
-    """List the names that arguments take: tasks, perception levels, robots, agents and others.
+    """List the valid names of arguments: tasks, perception levels, robots, agents and others.
 
     With --config, print every setting of the environment that the arguments describe, as TOML.
     """

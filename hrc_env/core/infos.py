@@ -358,7 +358,7 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
     given = [patterns] if isinstance(patterns, str) else patterns
     if not is_sequence_of_text(given):
         raise ConfigError(
-            'infos must be names or patterns of names, as ("cost", "safety/*"), got '
+            'infos must be names or patterns of names, such as ("cost", "safety/*"), got '
             f"{describe(patterns)}."
         )
     for each in given:

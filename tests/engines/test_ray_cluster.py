@@ -337,7 +337,7 @@ def test_machines_that_cannot_work_are_named(cluster, monkeypatch):
     with pytest.raises(ConfigError, match=r"cannot import 'no_such_module'.*--import"):
         ray_cluster.check_machines(machines, lacks_a_module)
     monkeypatch.setattr(ray_cluster, "VERSION", "0.0.9")
-    with pytest.raises(ConfigError, match=r"has hrc_env .*, and this one 0.0.9"):
+    with pytest.raises(ConfigError, match=r"has hrc_env .*, but this one has 0.0.9"):
         ray_cluster.check_machines(machines)
 
 
@@ -346,7 +346,7 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
     machines = ray_cluster.list_machines()
     share = ray_cluster.share_of(5, machines, said.append)
     assert 0 < share <= 2 / 5
-    assert said == ["5 workers on 2 cores: they take turns, and nothing is faster."]
+    assert said == ["5 workers on 2 cores: the workers take turns, so that this is not faster."]
     assert ray_cluster.share_of(2, machines, said.append) == 1.0
     found = list(RayTasks(5, note=said.append).run([cores] * 6, silent))
     assert sorted(each.k for each in found) == list(range(6))

@@ -41,7 +41,7 @@ def test_a_file_needs_names_and_places_only(tmp_path):
         ('[[cameras]]\nname = "a"\n', "a \\[\\[camera\\]\\] for each"),
         ("camera = 3\n", "a \\[\\[camera\\]\\] for each"),
         ("", "no camera"),
-        ("camera = [", "must be TOML"),
+        ("camera = [", "is not valid TOML"),
     ],
 )
 def test_a_wrong_file_is_refused_in_words_that_name_it(tmp_path, text, said):
