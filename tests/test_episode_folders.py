@@ -172,7 +172,7 @@ BAD = {
     "images of 10,000 pixels": (
         ["--observe-images", "84", "10000"], "width of images [px] must be"),
     "images for which there is no memory": (
-        ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are held in memory"),
+        ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are kept in memory"),
     "keypoints without cameras": (
         ["--keypoints", "--perception", "truth"], "--perception truth has none"),
     "two places": (["--out", "hrc/reach-v0"], "A data set needs exactly one destination"),

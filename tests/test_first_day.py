@@ -109,7 +109,7 @@ def test_actions_of_another_control_are_told_from_those_of_this_one(tmp_path):
     name = str(tmp_path / "plain.zip")
     assert find_control(name) == "twist"
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
-    with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
+    with pytest.raises(CheckpointError, match=r"uses control='twist'.*--control twist"):
         hrc_env.make_agent(name, joint)
     twist = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none", control="twist"))
     assert hrc_env.make_agent(name, twist).act(np.zeros((2, *twist.layout.low.shape))).shape == (
@@ -124,7 +124,7 @@ def test_a_checkpoint_of_train_tells_its_control(tmp_path):
     checkpoints.save(PPO("MlpPolicy", env, n_steps=8), tmp_path / "ours.zip", facts)
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
     for load in (checkpoints.load, acting.load):
-        with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
+        with pytest.raises(CheckpointError, match=r"uses control='twist'.*--control twist"):
             load(tmp_path / "ours.zip", joint)
 
 

@@ -341,9 +341,9 @@ def test_options_that_cannot_be_are_refused_in_words(options: dict, words: str) 
 
 @pytest.mark.parametrize(("options", "words"), [
     ({"each": [{}]}, "a list of 2 mappings"),
-    ({"each": [{"goal": GOAL}, None], "goal": GOAL}, "give it once"),
+    ({"each": [{"goal": GOAL}, None], "goal": GOAL}, "give it only once"),
     ({"goal": [GOAL] * 3}, "(2,)"),
-    ({"steps_left": 3, "elapsed_steps": 3}, "give one of them"),
+    ({"steps_left": 3, "elapsed_steps": 3}, "give only one of them"),
 ])  # fmt: skip
 def test_a_vector_refuses_options_that_exclude_each_other(options: dict, words: str) -> None:
     envs = HRCVectorEnv(2, num_threads=1, perception="truth")
@@ -458,5 +458,5 @@ def test_drawn_cameras_hang_in_the_room() -> None:
 
 def test_where_images_would_show_a_rig_that_is_not_drawn_it_is_refused() -> None:
     drawn = RigDistribution(max_shift_m=0.1)
-    with pytest.raises(ConfigError, match="at perception='truth' no rig is drawn"):
+    with pytest.raises(ConfigError, match="with perception='truth' no rig is drawn"):
         make(perception="truth", observe_images=(32, 32), cameras=drawn)

@@ -192,7 +192,7 @@ def _check_state(task: AnyTask) -> None:
         )
     for name, part in parts.items():
         shape = np.shape(cast(ArrayLike, part))
-        check_shape(f"{task.id}: {name}", shape[:1], (2,), "a row an environment")
+        check_shape(f"{task.id}: {name}", shape[:1], (2,), "one row per environment")
     info = task.info(state)
     check_kind(f"{task.id}: info", info, Mapping)
     _check_info(task, info, 2)
@@ -218,7 +218,9 @@ def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
     for name, value in info.items():
         if name != "is_success" and not name.startswith("task/"):
             raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
-        check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one an environment")
+        check_shape(
+            f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one entry per environment"
+        )
 
 
 def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:

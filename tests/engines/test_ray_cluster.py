@@ -159,8 +159,11 @@ def test_episodes_that_end_every_worker_end_with_its_error(cluster, shields, cap
 @pytest.mark.parametrize(
     ("shield", "error"),
     [
-        ("raises", "The last error: ValueError: this shield is broken. What was learnt is in"),
-        ("exits", "The last error: a process that was killed, or ran out of memory"),
+        (
+            "raises",
+            "The last error: ValueError: this shield is broken. The current policy is saved in",
+        ),
+        ("exits", "The last error: a process was killed or ran out of memory"),
     ],
     ids=["raises", "exits"],
 )
@@ -172,13 +175,15 @@ def test_training_that_ends_every_worker_ends_with_its_error(
     asked += ["--timesteps", "1000", "--no-film", "--out", str(tmp_path / "run")]
     assert main(["train", *asked]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "No worker has stepped in 2 updates" in said
+    assert "No worker completed a step in 2 updates" in said
     assert error in said
     assert (tmp_path / "run" / "policy.zip").exists()
 
 
 def test_workers_that_cannot_begin_say_why(cluster):
-    with pytest.raises(HRCError, match="could make its environments: Unknown estimator 'nonsense'"):
+    with pytest.raises(
+        HRCError, match="could create its environments: Unknown estimator 'nonsense'"
+    ):
         learning(1, estimator="nonsense")
 
 

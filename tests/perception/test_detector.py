@@ -234,7 +234,7 @@ def test_a_network_that_there_is_not_is_told_those_that_there_are():
 
 def test_wrong_shapes_are_explained(four):
     detector, stills = four
-    with pytest.raises(ConfigError, match="one a camera"):
+    with pytest.raises(ConfigError, match="one entry per camera"):
         detector.detect(stills, [WINDOW] * 3)
 
     class Small:
