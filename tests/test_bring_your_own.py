@@ -107,7 +107,7 @@ BAD = {
     ),
     "a term that is taken": (
         {"id": "HRCTend-v1", "rewards": hrc_env.rewards.SHARED_TERMS[:1]},
-        "term 'effort' already",
+        "term 'effort' exists already",
     ),
     "an info that lacks a count": (
         {"id": "HRCTend-v1", "achieved": "task/screws"},
@@ -221,7 +221,7 @@ def test_a_function_that_makes_an_estimator_is_one():
     [
         ({}, "The estimator 'dlt_kalman' exists already"),
         ({"make": lambda P, dt_s, config: object()}, "lacks init, reset, predict"),
-        ({"config": dict}, "must be a kind of TrackerConfig"),
+        ({"config": dict}, "must be a subclass of TrackerConfig"),
         ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),
         (
             {"make": lambda *given: Wrong(*given, np.zeros(7))},
@@ -432,12 +432,12 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
         ({"mjcf": "nowhere.xml"}, "cannot be used"),
         ({"tool_site": "top"}, "no site 'top'"),
         ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
-        ({"joints": ("lift", "turn", "bend")}, "in its order"),
+        ({"joints": ("lift", "turn", "bend")}, "in the same order"),
         ({"capsules": ("turret", "boom", "claw")}, "no geom 'claw'"),
         ({"watched_capsules": ("jip",)}, "Did you mean 'jib'"),
         ({"home_q": (0.0, 0.6)}, "home_q must be 3 angles"),
         ({"home_q": (0.0, 0.6, np.nan)}, "home_q must be 3 angles"),
-        ({"home_q": (3.0, 0.6, 1.2)}, "outside of the joints' ranges"),
+        ({"home_q": (3.0, 0.6, 1.2)}, "outside the joints' ranges"),
         ({"mjcf": lambda text: text.replace(SERVO, "")}, "needs an <intvelocity>"),
         ({"mjcf": lambda text: re.sub('capsule(" size=".05)', r"cylinder\1", text)},
          "must be a capsule"),

@@ -174,12 +174,12 @@ def shielded(shield):
 
 @pytest.mark.parametrize("name", ["active", "change", "scale"])
 def test_a_shield_says_nothing_that_is_measured_of_all(name):
-    with pytest.raises(hrc_env.ConfigError, match=f"must not return a value '{name}'"):
+    with pytest.raises(hrc_env.ConfigError, match=f"must not return the value '{name}'"):
         shielded(lambda now, velocities, dt_s: (velocities, {name: np.ones(len(velocities))}))
 
 
 def test_a_shield_that_is_faster_than_joints_can_be_is_warned_of():
-    with pytest.warns(UserWarning, match=r"lets joint \d go .* times as fast as it can"):
+    with pytest.warns(UserWarning, match=r"lets joint \d move at .* times its velocity limit"):
         shielded(lambda now, velocities, dt_s: (velocities * 100, {}))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

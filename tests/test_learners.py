@@ -95,7 +95,7 @@ def test_a_policy_for_goals_acts_where_there_are_goals_only(run):
     env = HRCEnv(REACH, perception="truth", n_workers=0, control="tool")
     action = agent.act(env.reset(seed=0)[0])
     assert action.shape == (3,)
-    with pytest.raises(CheckpointError, match="make it with the same task"):
+    with pytest.raises(CheckpointError, match="create it with the same task"):
         make_agent(str(run / "policy.zip"), told("HRCReach-v0"))
 
 

@@ -101,13 +101,13 @@ def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
     made(read_meta(), tmp_path / "policy.zip")
     assert restore_arguments(TrainingRequest(timesteps=513), tmp_path).timesteps == 513
     for wanted in (512, 1, None):
-        with pytest.raises(CheckpointError, match="was trained for 512 steps already"):
+        with pytest.raises(CheckpointError, match="was already trained for 512 steps"):
             restore_arguments(TrainingRequest(timesteps=wanted), tmp_path)
     made(read_meta(num_timesteps=511), tmp_path / "policy.zip")
     assert restore_arguments(TrainingRequest(), tmp_path).timesteps == 512
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": None}}))
     made(read_meta(num_timesteps=0), tmp_path / "policy.zip")
-    with pytest.raises(CheckpointError, match="was trained for 0 steps already"):
+    with pytest.raises(CheckpointError, match="was already trained for 0 steps"):
         restore_arguments(TrainingRequest(), tmp_path)
 
 

@@ -180,10 +180,10 @@ def test_images_may_look_different_and_have_faults(monkeypatch, changes):
 @pytest.mark.parametrize(
     ("level", "changes", "said"),
     [
-        *((level, {"appearance": AppearanceConfig(hat=0.5)}, "Looks are of images")
+        *((level, {"appearance": AppearanceConfig(hat=0.5)}, "Appearances need images")
           for level in LEVELS[1:]),
-        *((level, {"faults": (TIMING,)}, "Faults are of cameras") for level in LEVELS[2:]),
-        *((level, {"faults": (IMAGE,)}, "Faults are of cameras") for level in LEVELS[2:]),
+        *((level, {"faults": (TIMING,)}, "Faults need cameras") for level in LEVELS[2:]),
+        *((level, {"faults": (IMAGE,)}, "Faults need cameras") for level in LEVELS[2:]),
         ("keypoints", {"faults": (TIMING, IMAGE)}, r"Faults of images \(noise\) need images"),
         ("keypoints", {"faults": (FaultConfig("late", ("c",)),)}, "Unknown camera of fault"),
         ("pixel", {}, "Unknown perception 'pixel'"),

@@ -307,8 +307,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"people": "unawar"}, "Did you mean 'unaware'"),
     ({"activity": "hamer"}, "Did you mean 'hammer'"),
     ({"activity": "walk"}, "Valid: "),
-    ({"n_workers": 2, "activity": "saw"}, "fewer free places"),
-    ({"start_q": [0.0] * 5}, "one a joint"),
+    ({"n_workers": 2, "activity": "saw"}, "fewer free positions"),
+    ({"start_q": [0.0] * 5}, "one entry per joint"),
     ({"start_q": [9.0] * 6}, "joint 'shoulder_pan' must be from"),
     ({"start_q": [0.0, 1.5, 0.0, 0.0, 0.0, 0.0]}, "touch"),
     ({"cameras": ["camera_9"]}, "Did you mean"),
@@ -321,7 +321,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"faults": [{**LATE, "amount": [0.0, 3.0]}]}, "must be from 0 to 1 s"),
     ({"faults": [{**LATE, "amount": [0.0, 0.1, 0.2]}]}, "(least, most)"),
     ({"faults": [{"kind": "noise", "cameras": ["all"]}]}, "need images"),
-    ({"appearance": "varied"}, "Looks are of images"),
+    ({"appearance": "varied"}, "Appearances need images"),
     ({"steps_left": 0}, "steps_left"),
 ]
 
@@ -434,7 +434,7 @@ def test_images_are_of_the_rig_of_the_episode() -> None:
 @pytest.mark.usefixtures("pixels")
 def test_images_take_a_lens_where_the_environment_was_made_for_lenses() -> None:
     lenses = RigDistribution(lenses=(GOPRO,))
-    with pytest.raises(ConfigError, match="was made to observe images of cameras without"):
+    with pytest.raises(ConfigError, match="was created to observe images of cameras without"):
         make(observe_images=(32, 32)).reset(seed=1, options={"cameras": lenses})
     env = make(observe_images=(32, 32), cameras=lenses)
     seen, _ = env.reset(seed=1)
@@ -443,7 +443,7 @@ def test_images_take_a_lens_where_the_environment_was_made_for_lenses() -> None:
 
 def test_images_show_no_other_rig_where_nothing_looks_through_cameras(pixels) -> None:
     env = make(perception="truth", observe_images=(32, 32))
-    with pytest.raises(ConfigError, match="are of a perception level with cameras"):
+    with pytest.raises(ConfigError, match="requires a perception level with cameras"):
         env.reset(seed=1, options={"cameras": ["camera_1"]})
 
 

@@ -126,7 +126,7 @@ def test_methods_for_all_environments_together_are_not_for_some():
     env = HRCVecEnv(2, perception="none")
     env.env_method("set_reward", RewardConfig(effort=-5.0))
     assert env.simulation.reward_weights.effort == -5.0
-    with pytest.raises(ConfigError, match="for all environments together"):
+    with pytest.raises(ConfigError, match="to all environments together"):
         env.env_method("close", indices=[0])
     env.env_method("close")
     assert env.get_attr("closed") == [True, True]
@@ -138,7 +138,7 @@ def test_methods_for_all_environments_together_are_not_for_some():
         (lambda env: env.set_options({"steps": 1}), r"Did you mean 'steps_left'\?"),
         (lambda env: env.set_options({"steps_left": 0}), "from 1 to"),
         (lambda env: env.set_options({"reset_mask": np.ones(2, bool)}), "of one environment"),
-        (lambda env: env.set_options([{}]), "a mapping for each environment"),
+        (lambda env: env.set_options([{}]), "one mapping per environment"),
         (lambda env: env.set_attr("render_mode", "rgb_array"), "settings are fixed at creation"),
         (lambda env: env.set_attr("people", "hurried"), "settings are fixed at creation"),
         (lambda env: env.set_attr("np_random", 3), "must be a numpy.random.Generator"),

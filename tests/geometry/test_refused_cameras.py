@@ -21,7 +21,7 @@ CASES = {
     "x of its aim": ({}, {"target_world": (np.inf, 0.0, 1.0)}, "must be finite"),
     "z of its aim": ({}, {"target_world": (0.0, 0.0, np.nan)}, "must be finite"),
     "its roll": ({"roll_deg": -720.0}, {"roll_deg": np.inf}, "must be finite"),
-    "its distance": ({"target_world": (2.0, 1.0, 2.501001)}, CLOSE, "must differ from its position"),
+    "its distance": ({"target_world": (2.0, 1.0, 2.501001)}, CLOSE, "must differ from its"),
     "least width": ({"width_px": 64, "height_px": 64}, {"width_px": 63}, "width_px must"),
     "most width": ({"width_px": 16384}, {"width_px": 16385}, "width_px must be"),
     "least height": ({"height_px": 64}, {"height_px": 63}, "height_px must be"),

@@ -251,5 +251,9 @@ def test_eyes_without_weights_and_network_say_so_at_once(tmp_path, monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
     with pytest.raises(WeightsError, match="no route to host") as error:
         new_detector(1)
-    for part in ("python -m hrc_env setup", "Without a network: copy", "perception='keypoints'"):
+    for part in (
+        "python -m hrc_env setup",
+        "Without a network connection, copy",
+        "perception='keypoints'",
+    ):
         assert part in str(error.value)

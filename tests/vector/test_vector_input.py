@@ -110,7 +110,7 @@ def test_the_order_of_calls():
     with pytest.raises(ConfigError, match=r"environments \[0, 1\] have ended.*reset_mask"):
         env.step(np.zeros((2, 6)))
     env.reset(options={"reset_mask": np.array([True, False])})
-    with pytest.raises(ConfigError, match=r"environments \[1\] are over"):
+    with pytest.raises(ConfigError, match=r"environments \[1\] have ended"):
         env.step(np.zeros((2, 6)))
     env.close()
     for call in (env.reset, env.render, lambda: env.step(np.zeros((2, 6)))):
