@@ -96,8 +96,8 @@ READERS: dict[str, Callable[[Any], Any]] = {
 AGENTS_OWN = ("control",)
 """Arguments whose default is determined by the agent."""
 ON_THE_COMMAND_LINE = {
-    "faults": "Each is a JSON object.",
-    "cameras": "A RigDistribution is a JSON object.",
+    "faults": "On the command line, each fault is a JSON object.",
+    "cameras": "On the command line, a RigDistribution is a JSON object.",
     "observe_images": "On the command line: HEIGHT WIDTH, or a JSON object.",
     "people": "--config motion.people.FIELD=VALUE changes a single setting.",
     "appearance": "--config appearance.FIELD=VALUE changes a single setting.",

@@ -119,7 +119,7 @@ class ImportMotion:
 def print_capture(console: Console, capture: "Capture") -> None:
     """Print the length and frame rate of a recording, and the repairs that were made."""
     n_frames = len(capture.joints_world)
-    text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
+    text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} Hz, "
     console.print(text + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
     for sentence in capture.notes:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)

@@ -145,8 +145,8 @@ def check_rate(fps: float, source: str) -> None:
     """Raise `ConfigError` if a frame rate [Hz] is outside of the plausible range."""
     if not SLOWEST_HZ <= fps <= FASTEST_HZ:
         raise ConfigError(
-            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
-            f"expected, but the file has {fps:g}. If you know the correct one, pass it "
+            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames per second "
+            f"is expected, but the file has {fps:g}. If you know the correct one, pass it "
             "(--source-fps)."
         )
 

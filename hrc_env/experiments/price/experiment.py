@@ -373,6 +373,6 @@ def check_walks(task: str, alone: Rows, row: Row) -> None:
     """
     if find_task(task).signal is Task.signal and row.fresh["walk"] != alone["walk"]:
         raise HRCError(
-            f"In {task} workers moved differently than beside other robots, so rows cannot be "
+            f"In {task} workers moved differently than near other robots, so rows cannot be "
             "compared. Delete the folder's parts and start again."
         )
