@@ -398,7 +398,7 @@ def observation_table(env: HRCEnv) -> str:
 
 
 def _meaning(entry: Entry) -> str:
-    return entry.meaning + (f" (`{entry.flag}`: whether it was)" if entry.flag else "")
+    return entry.meaning + (f" (`{entry.flag}`: whether it was measured)" if entry.flag else "")
 
 
 def infos() -> str:

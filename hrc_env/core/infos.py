@@ -101,8 +101,8 @@ ENTRIES: dict[str, Entry] = {
     "shield/active": Entry("0 or 1", f"{SHIELDED}whether that change exceeds 0.02 rad/s"),
     "shield/scale": Entry(
         "-",
-        f"{SHIELDED}component of the allowed velocities along the command, "
-        "relative to its length; 1 if unchanged",
+        f"{SHIELDED}component of the allowed velocities along the command, as a share of the "
+        "command's length; 1 if unchanged",
     ),
     "shield/clearance_m": Entry(
         "m",
@@ -125,7 +125,8 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1", "whether the true surfaces came closer than `cost.proximity_m`"
     ),
     "cost_contact": Entry(
-        "0 or 1", "whether the true surfaces touched in any physics substep, by their distance"
+        "0 or 1",
+        "whether the true surfaces touched in any physics substep, according to their distance",
     ),
     "cost": Entry(
         "control steps",
@@ -201,7 +202,7 @@ ENTRIES: dict[str, Entry] = {
     "safety/near_misses": Entry(
         "-",
         "number of times in the episode so far that the separation fell below 0.05 m and rose "
-        "above 0.10 m without a touch",
+        "above 0.10 m again without a touch",
     ),
     "tracking/mpjpe_m": Entry(
         "m",
