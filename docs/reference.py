@@ -618,8 +618,8 @@ def command_line() -> str:
         "parts](../bring_your_own/index.md). A switch is given alone or with a value: `--film`, "
         "`--no-film`, `--film True`, `--film False`.",
         "## Arguments of an environment",
-        "`play`, `train`, `evaluate` and `record` take these; the first word after `play`, `evaluate` "
-        "or `record` is the task.",
+        "`play`, `train`, `evaluate` and `record` take these. The first word after `play`, "
+        "`evaluate` or `record` is the task.",
         _options(EnvironmentArguments),
     ]
     for name, (module, kind, purpose) in __main__.COMMANDS.items():
