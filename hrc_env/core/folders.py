@@ -59,7 +59,7 @@ def can_write(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
-    """Hold the lock of a folder; `wait` is called if another process holds it."""
+    """Hold the lock of a folder in a context; call `wait` if another process holds the lock."""
     try:
         import fcntl
 

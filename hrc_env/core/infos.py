@@ -31,9 +31,9 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Names in `OF_WORKERS` of the indices from which `name_indices` decodes each of its keys."""
+"""Keys that `name_indices` returns, with the names in `OF_WORKERS` of the indices it decodes."""
 PEOPLE = ("activity", "body")
-"""Names of the words that every worker has."""
+"""Names in `OF_WORKERS` of the indices that every worker has."""
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
@@ -41,7 +41,7 @@ MORE_PEOPLE = "perception/more_people_than_slots"
 N_CAMERAS = "episode/n_cameras"
 MOVED, TURNED = "episode/max_camera_shift_m", "episode/max_camera_rotation_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
-"""Keys of the random draws of an episode."""
+"""Keys of properties that are sampled for each episode: delay, light, and the prefix for faults."""
 
 
 RENAMED = {
@@ -274,12 +274,12 @@ OF_WORKERS: dict[str, str] = {
 }
 """Meanings of the keys `worker_N/NAME` by NAME; N counts from 0."""
 OWN = Entry("-", "", 0.0)
-"""Description of a number that a user's task or shield returns."""
+"""Description of a number that a user's custom task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
 """Prefixes of keys that always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")
-"""Prefixes of keys that concern the robot's belief."""
+"""Prefixes of keys of numbers that depend on the robot's belief."""
 
 
 @cache
@@ -339,7 +339,10 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
 
 
 def of_workers(**parts: Ints) -> Info:
-    """Return one info per worker and name, from indices (B, W) named as in `OF_WORKERS`."""
+    """Return one info per worker and name.
+
+    The arguments are indices (B, W), named as in `OF_WORKERS`.
+    """
     return {
         f"worker_{w}/{name}": part[:, w].astype(np.int64)
         for name, part in parts.items()

@@ -39,8 +39,8 @@ class Keypoints:
     """
 
     px: Points2
-    """Positions of the joints (B, C, W, J, 2) [px], continuous from the image's top-left corner;
-    NaN where there is no measurement."""
+    """Image coordinates of the joints (B, C, W, J, 2) [px], continuous, with the origin at the
+    image's top-left corner; NaN where there is no measurement."""
     confidence: Floats
     """Confidence (B, C, W, J) in [0, 1]; 0 where there is no measurement."""
     sigma_px: Floats
@@ -56,9 +56,10 @@ class Roi:
     """A square region of one camera's image, rotated about its centre."""
 
     centre_px: tuple[float, float]
-    """Position of its centre, x and y [px] from the image's top-left corner."""
+    """Image coordinates x, y of the region's centre [px], relative to the image's top-left
+    corner."""
     side_px: float
-    """Length of its sides [px]."""
+    """Side length of the region [px]."""
     rotation_rad: float
     """Rotation of the region's upright direction, clockwise in the image [rad]; 0 is upright."""
 
@@ -85,21 +86,22 @@ class PoseEstimate:
     age_s: Floats
     """Time since each joint was last supported by a measurement (B, W, J) [s]."""
     tracked: Bools
-    """Whether each slot has a track (B, W); otherwise it has the prior, or a prediction that has
-    lasted too long (lost)."""
+    """Whether each slot has a track (B, W). A slot without a track has the prior, or a prediction
+    that is too old to count as a track."""
     unknown: Bools = None  # type: ignore[assignment]
-    """Whether a person without a track may be in the slot (B, W): lost, not searched for enough,
-    detected but not tracked, or on floor that no two cameras see (`tracking.presence`); True for
-    all slots while there are more people than slots. A slot that is neither tracked nor unknown is
-    empty. Default: every slot without a track is unknown."""
+    """Whether the slot may contain an untracked person (B, W), because a track was lost, the
+    searches do not suffice, a detected person is not tracked, or fewer than two cameras see part of
+    the floor (`tracking.presence`); True for all slots while there are more people than slots. A
+    slot that is neither tracked nor unknown is empty. Default: every slot without a track is
+    unknown."""
     unobserved_s: Floats = None  # type: ignore[assignment]
-    """Time since the cameras last observed the worker or saw that the slot is empty (B, W) [s];
-    without any observation, the time since the reset. Default: age of the joint with the most
+    """Time since the cameras last observed the worker, or observed that the slot is empty (B, W)
+    [s]; without any observation, the time since the reset. Default: age of the joint with the most
     recent measurement."""
     seen_world: Points3 = None  # type: ignore[assignment]
-    """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN without any
-    detection, or if that location was seen empty since. Default: the means of slots with a track,
-    otherwise NaN."""
+    """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN if there was no
+    detection, or if cameras have since observed that no person is at these positions. Default: the
+    means of slots with a track, otherwise NaN."""
 
     def __post_init__(self) -> None:
         try:
@@ -135,7 +137,10 @@ class WorkerPath:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Objects in the workers' hands, followed by L objects that lie ready; see `props.PROPS`."""
+    """Objects in the workers' hands, followed by L objects that are ready to be used.
+
+    `props.PROPS` lists the kinds of objects.
+    """
 
     kind: Ints
     """Kind of each object (B, W + L), as an index into `props.PROPS`; 0 for no object."""
@@ -158,7 +163,7 @@ class WorkerMotion:
     angular_velocity_world: Floats
     """Angular velocities of the segments in the world frame (B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """Objects that the workers hold and that lie ready for them; None if there are none."""
+    """Objects that the workers hold, and those that are ready for them; None if there are none."""
     body: Ints | None = None
     """Index of each worker's body among the scene's bodies (B, W); None if all have the first
     one."""
@@ -166,7 +171,7 @@ class WorkerMotion:
 
 @dataclass(frozen=True, slots=True)
 class WorkerTruth:
-    """The true workers; only emulators of detectors, cost and metrics read this record."""
+    """True state of the workers; only emulators of detectors, cost and metrics read this record."""
 
     joints_world: Points3
     """True positions of the joints (B, W, J, 3), defined as in BlazePose [m]."""
@@ -180,7 +185,7 @@ class WorkerTruth:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """State of the robot from the robot's encoders: exact, hence neither belief nor truth."""
+    """State of the robot according to its encoders: exact, hence neither belief nor truth."""
 
     q: JointAngles
     """Joint positions (B, N) [rad], of slides [m]."""

@@ -1,7 +1,7 @@
 """Registries of objects by name: those of the package and those that users register.
 
-A name that was registered in the parent process is available here, too; its object is unpickled on
-first use. A registration in this process replaces it.
+Registrations of the parent process are inherited; their objects are unpickled on first use. A
+registration of the same name in this process replaces an inherited one.
 """
 
 import threading
@@ -24,8 +24,8 @@ error."""
 _LOCK = threading.RLock()
 _REGISTRIES: "dict[str, Registry[Any]]" = {}
 _IMPORTING: list[str] = []
-"""Files that are being imported, the innermost last; "" for a file that every child process imports
-by itself."""
+"""Stack of the files that are being imported, with the innermost last; "" stands for a file that
+every child process imports by itself."""
 
 
 class Registry(UserDict[str, ObjectT]):
@@ -40,7 +40,7 @@ class Registry(UserDict[str, ObjectT]):
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:
-        """Register an object, also for child processes; a name that is taken is a `ConfigError`."""
+        """Register an object, also for child processes; raise `ConfigError` if its name exists."""
         taken = name in self.data and (name in self.own or name not in self.inherited)
         if taken:
             raise ConfigError(f"There is the {self.kind} {name!r} already; choose another name.")

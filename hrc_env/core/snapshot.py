@@ -24,14 +24,14 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Form in which a registered object reaches another process: a pickle, a file, or neither."""
+    """Form in which child processes receive a registered object: a pickle, a file, or neither."""
 
     pickled: bytes = b""
     """The object, pickled by value; empty if it was not pickled."""
     file: str = ""
     """Python file that registers the object; empty for none."""
     refused: str = ""
-    """Error raised when the object was pickled; empty for none."""
+    """Message of the error that occurred when the object was pickled; empty for none."""
     max_episode_steps: int = 0
     """Time limit of a task [control steps]; 0 for other objects."""
 
@@ -145,7 +145,7 @@ def _warn(said: str) -> None:
 
 
 def _begun() -> _State:
-    """Return the initial state, at import."""
+    """Return the state of this module at import."""
     reserve()
     own, _, others = os.environ[VARIABLE].partition(os.pathsep)
     return _State(others, os.getpid(), own)

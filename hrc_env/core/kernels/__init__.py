@@ -20,7 +20,7 @@ import numba
 from numba.core import config
 
 LEAN_WITH = ("0.68",)
-"""Releases of numba with which `lean`, which depends on the compiler's internals, was tested."""
+"""Releases of numba for which `lean` was tested; it depends on internals of the compiler."""
 UNTESTED = "hrc_env's compiler of kernels was not tested with numba"
 """Beginning of the warning about an untested release."""
 KERNELS: dict[str, Any] = {}
