@@ -80,7 +80,7 @@ def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgres
         setting: the setting.
         walks: walks of the workers.
         seeds: seeds of detector and estimator; episode k uses turn k modulo the number of turns.
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     jobs, found = _split_jobs(setting.turns, len(seeds)), Sums()
 

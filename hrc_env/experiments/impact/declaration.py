@@ -112,7 +112,7 @@ def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> 
     Args:
         policy: label of the policy.
         setups: names of perception setups, without the reference.
-        marked: whether differences are marked if their interval excludes zero.
+        marked: whether a difference is marked if its interval excludes zero.
     """
     columns = [
         replace(each, metric=f"difference.{each.metric}", signed=True, marked=marked)

@@ -1,12 +1,14 @@
 """Metrics of the impact study: rows, differences from the reference, and the cost of latency.
 
-The separation lost to latency is measured in two ways, both relative to the ground truth: in the
-belief, as the increase of the 95th percentile of the estimated minus the true separation; in the
-loop, as the margin that `scripted_slowed` must add to its limits to have the same share of missed
-stops as without latency. It is predicted as latency x (v_h + v_r), with a worker's nominal speed or
-with measured speeds. A third prediction assumes that latency and other errors are independent:
-their squares then add up, and the robot's speed has no effect, because its encoders have no
-latency.
+The loss of separation due to latency is measured in two ways, both relative to the ground truth:
+
+- in the belief, as the increase of the 95th percentile of the estimated minus the true separation;
+- in closed loop, as the margin that `scripted_slowed` must add to its limits to reach the fraction
+  of missed stops without latency.
+
+It is predicted as latency x (v_h + v_r), with either the nominal speed of a worker or measured
+speeds. A third prediction assumes that the effect of latency is independent of other errors: their
+squares add up, and the robot's speed has no effect, because the robot's encoders have no latency.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,7 +43,8 @@ PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
-"""Sums that are given per 1,000 control steps; `called_slowings` counts steps near the worker."""
+"""Sums that are reported per 1,000 control steps; `called_slowings` counts steps near the
+worker."""
 AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
 """Sums that are averaged over episodes, with their units."""
 
@@ -174,7 +177,7 @@ def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
 def _measure_lateness(
     setup: PerceptionSetup, table: Played, metrics: Metrics, margins_m: Sequence[float]
 ) -> dict[str, Metric]:
-    """Return the separation lost to latency [m], predicted in three ways and measured in two."""
+    """Return the separation lost to latency [m], as predicted in three ways and measured in two."""
     key, reference = f"{SLOWED}.{setup.name}", f"{SLOWED}.{REFERENCE}"
     v_h, v_r = metrics[f"{key}.v_h_mps"].value, metrics[f"{key}.v_r_mps"].value
     before, after = metrics[f"{reference}.optimism_p95_m"], metrics[f"{key}.optimism_p95_m"]
@@ -196,7 +199,7 @@ def _measure_lateness(
 
 
 def find_margin(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
-    """Return the margin at which the share of missed stops falls to that of the reference [m].
+    """Return the margin at which the fraction of missed stops falls to that of the reference [m].
 
     Args:
         rows: rows of one setup, one per margin.

@@ -8,14 +8,14 @@ from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.safety.shield import SHIELDS
 
 SHIELD = "qp"
-"""Name of the shield that gets the margin."""
+"""Name of the shield to which the margin is added."""
 
 
 @dataclass(slots=True)
 class Widened:
-    """The shield `SHIELD` for a robot with capsules that are thickened by a margin.
+    """The shield `SHIELD` for a robot with capsule radii that are increased by a margin.
 
-    All protective distances therefore grow by the margin, which may be negative. The shield
+    All protective distances therefore change by the margin, which may be negative. The shield
     receives the estimator's covariances multiplied by `covariance`.
     """
 

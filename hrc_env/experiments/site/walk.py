@@ -22,7 +22,7 @@ PASSING = MotionConfig(
 )
 """Settings of motion with which workers leave each workplace as soon as they reach it.
 
-They are a judgement: the paper only states that the worker walked.
+The values are assumptions, because the paper states only that the worker walked.
 """
 
 
