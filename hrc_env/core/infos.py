@@ -22,7 +22,7 @@ from hrc_env.core.typing import Ints, is_sequence_of_text
 Info = dict[str, NDArray[Any]]
 """Numbers (B,) by name; NaN where an environment has none in this step."""
 ABSENT = "absent"
-"""Activity and body of a worker that is not in the episode; its index is -1."""
+"""Name of the activity and of the body of a worker that is not in the episode; the index is -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
 CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 WORDS = {

@@ -122,7 +122,7 @@ def _is_private(folder: Path) -> bool:
 def _read(source: str) -> None:
     try:
         about = os.stat(source)
-    except OSError:  # no longer there
+    except OSError:  # the file no longer exists
         return
     seen = (about.st_ino, about.st_mtime_ns)
     if seen == _STATE.seen:

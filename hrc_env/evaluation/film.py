@@ -90,7 +90,7 @@ def find_nearest_seed(
     free = [seed for seed, distance_m in closest_m.items() if distance_m > CLOSE_M]
     if free:
         return min(free, key=closest_m.__getitem__)
-    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least close
+    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the most distant
 
 
 def begin_episode(env: Any, make: AgentFactory, seed: int, n_steps: int) -> Iterator[Transition]:

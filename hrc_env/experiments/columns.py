@@ -113,7 +113,7 @@ def per_minute(
     Args:
         statistic: one of `STATISTICS`. For the achievements of a task
             (`hrc_env.evaluation.sums.ACHIEVED`), the interval of a rate of zero is exact.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: `STATISTIC_per_minute`).
         unit: unit of the metric (default: that of the statistic, per minute).
         shown: fields of `Column`.
@@ -142,7 +142,7 @@ def rate(
 
     Args:
         statistics: one of `STATISTICS`, or several that are added.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: that of the first statistic).
         per: name of the exposure in `EXPOSURES`.
         shown: fields of `Column`.
@@ -181,7 +181,7 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
@@ -196,7 +196,7 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
     """Return the column "success", the fraction of a task's attempts that succeeded.
 
     Args:
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         clustered: whether attempts in one episode are dependent and the interval is computed over
             episodes; otherwise every attempt counts as a trial.
         shown: fields of `Column`.
@@ -218,7 +218,7 @@ def share_of_baseline(
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric.
         shown: fields of `Column`.
     """
@@ -239,7 +239,7 @@ def difference_from_baseline(
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: `difference.STATISTIC`).
         unit: unit of the metric.
         shown: fields of `Column`.

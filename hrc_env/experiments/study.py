@@ -126,7 +126,7 @@ class Row:
         check_names("perception", [self.setup.level], LEVELS)
         check_choice(self.agent)
         for keywords in self.keywords():
-            keywords.pop("max_episode_steps", None)  # Gymnasium's own
+            keywords.pop("max_episode_steps", None)  # an argument of Gymnasium
             resolve_settings(**keywords)
 
 

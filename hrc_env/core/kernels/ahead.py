@@ -61,7 +61,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
 
     Other child processes take kernels from the same iterator.
     """
-    quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
+    quiet = f"ignore:{UNTESTED}"  # the parent process warns once
     command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:

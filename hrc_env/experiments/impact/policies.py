@@ -134,7 +134,7 @@ def train(env: Any, n_steps: int, seed: int, on_step: Callable[[Any], None]) -> 
         seed: seed of the learner.
         on_step: callback that receives the learner before the training and after each step.
     """
-    import torch  # here: a learner takes seconds to import, and need not be there
+    import torch  # here: it takes seconds to import and is optional
     from stable_baselines3.common.callbacks import ConvertCallback
 
     from hrc_env.agents import callbacks, ppo

@@ -278,7 +278,7 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
 
     yield from search(measure_rate, *config.bracket_m, config.level, config.n_search)
     row = yield from confirm(suppose_margin_m(tried, config.level))
-    for beyond_m in BEYOND_M:  # if fresh seeds place the level at the last margin
+    for beyond_m in BEYOND_M:  # if the new seeds put the level at an outermost margin
         end_m = float(row.evaluate(config.level)[0, 0])
         if not row.ends_at(end_m):
             return row
