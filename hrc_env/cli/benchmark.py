@@ -33,8 +33,8 @@ class Benchmark(EngineArguments):
     """Ids of the environments, including those registered by --import. A learnt policy fits only
     one environment."""
     control: str | None = None
-    """Control mode of the policy's actions: joint (default), tool or twist. Checkpoints contain
-    their control mode."""
+    """Control mode of the policy's actions: joint (default), tool or twist. A checkpoint contains
+    the control mode of its policy."""
     out: Path | None = None
     """Folder for report.html and results.json (default: out/benchmark/POLICY)."""
     seeds: int = 64

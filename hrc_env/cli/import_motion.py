@@ -53,12 +53,13 @@ class ImportMotion:
     fps: float | None = None
     """Frame rate of the clip [1/s] (default: that of the recording, at most 60)."""
     source_fps: float | None = None
-    """True frame rate of the recording [1/s], if its file contains none (AMC) or a wrong one."""
+    """True frame rate of the recording [1/s], for files without a frame rate (AMC) or with a wrong
+    one."""
     skeleton: Path | None = None
     """Skeleton file (.asf) of an .amc recording, if it is not in the same folder."""
     joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Joint of the worker and its unrecognized name in the file, such as left_shoulder=lShldr, or a
-    TOML file with such lines. The option may be repeated."""
+    """Assignment of a joint to its name in the file if that name is not recognized, such as
+    left_shoulder=lShldr; or a TOML file with such lines. The option may be repeated."""
     up: str | None = None
     """Upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 RowT = TypeVar("RowT", covariant=True)
 NewT = TypeVar("NewT")
 Selection: TypeAlias = slice | NDArray[Any] | list[int] | EllipsisType
-"""An index that selects rows and keeps their axis."""
+"""Index that selects rows and keeps their axis."""
 SCALARS: dict[Any, str] = {bool: "?", int: "i8", float: "f8"}
 """NumPy type codes of the fields that hold a single value."""
 

@@ -42,7 +42,7 @@ class NoAttributeError(ConfigError, AttributeError):
 
 
 class DownloadError(HRCError, RuntimeError):
-    """A file cannot be downloaded, or its content is not the expected one."""
+    """A file cannot be downloaded or has unexpected content."""
 
 
 class WeightsError(DownloadError):

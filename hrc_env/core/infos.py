@@ -20,7 +20,7 @@ from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
-"""Numbers (B,) by name; NaN where an environment has none in this step."""
+"""Numbers (B,) by name; NaN for environments in which a number does not exist in this step."""
 ABSENT = "absent"
 """Name of the activity and of the body of a worker that is not in the episode; the index is -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
@@ -31,7 +31,8 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Keys that `name_indices` returns, with the names in `OF_WORKERS` of the indices it decodes."""
+"""Keys that `name_indices` returns. The values are the names in `OF_WORKERS` of the indices that
+are decoded."""
 PEOPLE = ("activity", "body")
 """Names in `OF_WORKERS` of the indices that every worker has."""
 Words = dict[str, tuple[str, ...]]
@@ -263,7 +264,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     LIGHT: Entry("-", "drawn: strength of the light, 1 as built; at `pixels` and `keypoints`"),
 }
-"""Descriptions of the numbers by key, except reward terms and the numbers of each worker and each
+"""Descriptions of the numbers by key, without reward terms and the numbers of each worker and
 camera."""
 OF_WORKERS: dict[str, str] = {
     "activity": "activity of worker N, as an index; -1: not in the episode",
@@ -272,7 +273,8 @@ OF_WORKERS: dict[str, str] = {
     "motion in the step before: 0 towards the worker, 1 away, 2 neither; -1: none begins",
     "contact_region": "region of the body that this contact hits, as an index; -1: none",
 }
-"""Meanings of the keys `worker_N/NAME` by NAME; N counts from 0."""
+"""Meanings of the infos of worker N, which have the keys `worker_N/NAME`, by NAME; N is the
+worker's index."""
 OWN = Entry("-", "", 0.0)
 """Description of a number that a user's custom task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)

@@ -20,8 +20,8 @@ from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy
 
 RecordT = TypeVar("RecordT")
 PRESETS: dict[Any, dict[str, Any]] = {}
-"""Named values of settings: for each type hint of a field, the values by the names that it
-accepts."""
+"""Named values of settings: for each type hint, a mapping from the accepted names to their
+values."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 

@@ -33,7 +33,7 @@ from hrc_env.core.typing import (
 
 @dataclass(frozen=True, slots=True)
 class Keypoints:
-    """Joints in the images, as a detector or its emulator reports them [px].
+    """Measurements of the joints in the images, made by a detector or its emulator.
 
     A joint that was not found has NaN coordinates and confidence 0; this is not an error.
     """
@@ -76,8 +76,8 @@ class PoseEstimate:
     """Current names of renamed fields, by their old names."""
 
     mean_world: Points3
-    """Mean positions of the joints (B, W, J, 3) in the world frame [m]; without a track, those of
-    the documented prior."""
+    """Mean positions of the joints (B, W, J, 3) in the world frame [m]; for slots without a track,
+    the means of the prior."""
     cov_world: Covariances3
     """Covariance of each joint's position (B, W, J, 3, 3) [m^2], always finite and positive
     definite."""
@@ -163,10 +163,11 @@ class WorkerMotion:
     angular_velocity_world: Floats
     """Angular velocities of the segments in the world frame (B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """Objects that the workers hold, and those that are ready for them; None if there are none."""
+    """Objects that the workers hold, and objects that are ready for them; None if there are
+    none."""
     body: Ints | None = None
-    """Index of each worker's body among the scene's bodies (B, W); None if all have the first
-    one."""
+    """Index of each worker's body in the scene's list of bodies (B, W); None if all workers have
+    the first body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +181,7 @@ class WorkerTruth:
     capsules_world: Capsules
     """End points of the capsules of the bodies (B, W, K, 2, 3) [m]."""
     capsule_radius_m: Floats
-    """Radii of these capsules (B, W, K) [m]."""
+    """Radii of the capsules in `capsules_world` (B, W, K) [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,9 +189,9 @@ class RobotState:
     """State of the robot according to its encoders: exact, hence neither belief nor truth."""
 
     q: JointAngles
-    """Joint positions (B, N) [rad], of slides [m]."""
+    """Joint positions (B, N) [rad], or [m] for slides."""
     qd: JointVelocities
-    """Joint velocities (B, N) [rad/s], of slides [m/s]."""
+    """Joint velocities (B, N) [rad/s], or [m/s] for slides."""
     tool_world: Points3
     """Position of the tool point (B, 3) [m]."""
     tool_velocity_world: Velocities3
@@ -198,13 +199,13 @@ class RobotState:
     tool_axes_world: Floats
     """Axes x, y and z of the tool in the world frame, as columns (B, 3, 3)."""
     capsules_world: Capsules
-    """End points of the capsules of the robot and its loads (B, K, 2, 3) [m]; those of absent loads
-    are far away."""
+    """End points of the capsules of the robot and its loads (B, K, 2, 3) [m]; the capsules of
+    absent loads are far away."""
     capsule_radius_m: Floats
-    """Radii of these capsules (K,) [m]."""
+    """Radii of the capsules in `capsules_world` (K,) [m]."""
     slides: Bools | None = None
-    """Whether each joint is a slide (N,), with `q` in m and `qd` in m/s; None if there is no
-    slide."""
+    """Whether each joint is a slide (N,), with `q` in [m] and `qd` in [m/s]; None if there are no
+    slides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,10 +213,10 @@ class HandState:
     """State of the gripper from the robot's encoders."""
 
     opening_m: Floats
-    """Distance of each finger from the middle (B,) [m]."""
+    """Distance of each finger from the middle of the gripper (B,) [m]."""
     force_n: Floats
-    """Force with which the motor presses the fingers together (B,) [N]; negative if it opens
-    them."""
+    """Force with which the motor presses the fingers together (B,) [N]; negative if it opens the
+    gripper."""
     closed_on: Bools
     """Whether the fingers press and rest on an object (B,)."""
 

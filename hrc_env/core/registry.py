@@ -19,7 +19,7 @@ from hrc_env.core.snapshot import Entry, Snapshot
 
 ObjectT = TypeVar("ObjectT")
 FILES: dict[str, str] = {}
-"""Python files that this process imported, with the error message of each; "" if it had no
+"""Python files that this process imported, with their error messages; "" for a file without an
 error."""
 _LOCK = threading.RLock()
 _REGISTRIES: "dict[str, Registry[Any]]" = {}
@@ -35,8 +35,8 @@ class Registry(UserDict[str, ObjectT]):
         super().__init__(known or {})
         self.kind = kind
         self.own: dict[str, str | None] = {}
-        """Names that were registered in this process, with the file that registered each; None if
-        no file is known."""
+        """Names registered in this process, with the file that registered each name; None if the
+        file is unknown."""
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:

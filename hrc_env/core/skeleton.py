@@ -25,7 +25,7 @@ N_JOINTS = len(JOINTS)
 JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 
 BLAZEPOSE_INDEX: Ints = np.array([0, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28, 31, 32])
-"""Index of each of `JOINTS` among BlazePose's 33 landmarks (31 and 32 are its foot tips)."""
+"""Index of each of `JOINTS` among BlazePose's 33 landmarks (31 and 32 are the tips of the feet)."""
 
 MIRROR: Ints = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13])
 """Index of the joint that corresponds to each joint on the opposite side of the body."""

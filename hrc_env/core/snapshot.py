@@ -45,7 +45,7 @@ class Snapshot:
     )
     """Entries by kind (such as "robot") and name."""
     files: tuple[str, ...] = ()
-    """Python files to import, in this order."""
+    """Python files to import, in the order of this sequence."""
 
 
 @dataclass(slots=True)
@@ -59,7 +59,7 @@ class _State:
     path: str
     """Path of the file of this process."""
     written: Snapshot | None = None
-    """Content of that file; None if it was not written."""
+    """Content of the file at `path`; None if it was not written."""
     seen: tuple[int, int] = (0, 0)
     """Inode and modification time of the inherited file when it was last read."""
     inherited: Snapshot = Snapshot()

@@ -38,9 +38,9 @@ class Others:
     """Detected people in excess of the workers' slots."""
 
     hips_world: Points3
-    """Last detected positions of their hips (B, N, 3) [m]; NaN in unused rows."""
+    """Last detected hip positions of the people (B, N, 3) [m]; NaN in unused rows."""
     age_s: Floats
-    """Time since they were detected (B, N) [s]; infinite in unused rows."""
+    """Time since the people were last detected (B, N) [s]; infinite in unused rows."""
 
     @property
     def any(self) -> Bools:
@@ -62,6 +62,6 @@ class Vacancy:
     """State of each group of patches of a `Coverage` (B, W, G): `POSSIBLE`, `PROBABLY_EMPTY` or
     `EMPTY`."""
     age_s: Floats
-    """Age of the oldest frame on which these states are based (B, W) [s]."""
+    """Age of the oldest frame on which `level` is based (B, W) [s]."""
     others: Others
     """Detected people in excess of the slots."""

@@ -59,8 +59,8 @@ class Episode:
     "safety/..." and "is_success". If poses are recorded, it also contains "joints_world"
     (T + 1, W, J, 3) [m], which is NaN for absent workers, and the mask "present" (T + 1, W)."""
     keypoints: Keypoints | None = None
-    """Keypoints (T + 1, C, W, J) that the estimator received, in pixels of the projections `P`;
-    None if they were not recorded."""
+    """Keypoints (T + 1, C, W, J) that the estimator received [px], in the image coordinates of the
+    projections `P`; None if they were not recorded."""
     P: NDArray[np.float64] | None = None
     """Projection matrices (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels;
     NaN for missing cameras. They are given if keypoints are recorded and the rig is sampled in

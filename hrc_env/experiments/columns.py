@@ -31,8 +31,8 @@ class Column:
     """A column of a table."""
 
     metric: str
-    """Name of the metric, with `{}` in place of the row's key, or `{0}` and `{1}` for its two
-    parts."""
+    """Name of the metric, with the placeholder `{}` for the row's key, or `{0}` and `{1}` for the
+    parts of the key."""
     heading: str = ""
     """Heading with the unit, as "cost [1/min]"; "" for a metric that only results.json contains."""
     digits: int = 1
@@ -40,7 +40,7 @@ class Column:
     scale: float = 1.0
     """Factor that converts the unit of the metric to that of the heading."""
     signed: bool = False
-    """Whether the metric is a difference, which is shown with its sign."""
+    """Whether the metric is a difference, which is always shown with a sign."""
     marked: bool = True
     """Whether a difference is marked with a dot if its interval excludes zero."""
     counted: bool = False

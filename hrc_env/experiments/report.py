@@ -51,7 +51,8 @@ class Table:
     """Text below the table. `{n[METRIC]}` is replaced by the number of observations of a metric,
     and `{NAME}` by one of `numbers`."""
     numbers: Mapping[str, Column] = field(default_factory=dict)
-    """Metrics in the note or in sentences of the documentation, by the names that these use."""
+    """Columns with the numbers that the note, or sentences of the documentation, contain, by
+    name."""
     printed: Mapping[str, float] = field(default_factory=dict)
     """Values that other publications report, by the names of the corresponding metrics."""
 

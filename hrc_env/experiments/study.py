@@ -62,7 +62,7 @@ class Row:
     env: Mapping[str, Any] = field(default_factory=dict)
     """Other arguments of the environment, as in `gymnasium.make`."""
     baseline: str | None = None
-    """Name of the row with which columns that are `is_paired` compare this row, on the same
+    """Name of the row with which the columns that are `is_paired` compare this row on the same
     seeds."""
     n_together: int = 250
     """Maximum number of episodes in one part, which are played as one batch."""

@@ -21,8 +21,8 @@ log = logging.getLogger("hrc_env.core.kernels")
 Say = Callable[[float, str], None]
 """Callback that receives the increase of the completed fraction and the current activity."""
 AT_ONCE_S = 3.0
-"""Compile time below which a kernel is compiled on its first call [s]; it is about the time that
-starting a process takes."""
+"""Compile time below which a kernel is compiled on its first call [s]; the start of a process takes
+about as long."""
 LOG_EVERY_S = 10.0
 
 

@@ -25,7 +25,7 @@ PATH = Path(__file__).with_name("signatures.json")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A kernel with the types of the arguments that it is called with."""
+    """A kernel with the types of its arguments in a recorded call."""
 
     kernel: str
     """Name of the kernel, as "module:name"."""

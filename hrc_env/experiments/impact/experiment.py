@@ -77,7 +77,7 @@ class Impact:
     policies: tuple[str, ...] = POLICIES
     """Policies to compare: `POLICIES`, or agents as `hrc_env.make_agent` accepts them."""
     control: str | None = None
-    """Control mode of policies for which their files contain none; None: the default."""
+    """Control mode of the policies that have none in their files; None: the default."""
     trust: bool = False
     """Whether pickles in the policies' checkpoints may be loaded, as in `make_agent`."""
     setups: tuple[str, ...] = field(default_factory=list_default_setups)

@@ -38,7 +38,7 @@ verify against the standard before certification) [m/s]."""
 CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
 """Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
-"""Metrics per minute, with the names of the sums from which they are computed."""
+"""Metrics per minute, with the names of the sums that are divided by the duration."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",

@@ -93,7 +93,7 @@ def fit_falling_rates(events: Floats, minutes: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class MarginSearch:
-    """Sums of the episodes of a search, one column per seed."""
+    """Sums of the episodes of a search and of those on new seeds, with one column per seed."""
 
     margins_m: Floats
     """Margins (K,) in increasing order [m]."""

@@ -20,7 +20,7 @@ class Widened:
     """
 
     covariance: float = 1.0
-    """Factor on the covariances."""
+    """Factor by which the estimator's covariances are multiplied."""
     margin_m: float = 0.0
     """Margin [m], which may be changed between episodes."""
 
