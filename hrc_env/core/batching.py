@@ -71,7 +71,7 @@ def copy_arrays(value: Any) -> Any:
 
 
 def flatten_axes(array: Floats, n_last: int) -> Floats:
-    """Return an array (..., *last) reshaped to (count, *last), contiguous.
+    """Return an array (..., *last) reshaped to (count, *last), in contiguous memory.
 
     `last` stands for the last `n_last` axes.
     """

@@ -134,7 +134,7 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
 
 
 def points_of(what: str, value: object) -> NDArray[np.float64]:
-    """Return a value as at least one point, (N, 3), or raise `ConfigError`."""
+    """Return a value as an array (N, 3) of at least one point, or raise `ConfigError`."""
     return numbers_of(what, value, (count_of(value), 3), "points, xyz")
 
 

@@ -45,7 +45,7 @@ SCALARS: dict[Any, str] = {bool: "?", int: "i8", float: "f8"}
 
 @cache
 def dtype_of(declaration: type) -> np.dtype[Any]:
-    """Return the structured dtype of a declared record, its fields aligned as in C.
+    """Return the structured dtype of a declared record, with fields aligned as in C.
 
     Args:
         declaration: a class whose annotated attributes are the fields, in order: `bool`, `int` or

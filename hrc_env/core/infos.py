@@ -310,7 +310,7 @@ def publish(info: Info) -> Info:
 
 
 def is_of_belief(name: str) -> bool:
-    """Return whether an info concerns the robot's belief; all others describe the truth."""
+    """Return whether an info depends on the robot's belief; all others describe the truth."""
     return name.startswith(OF_BELIEF)
 
 

@@ -1,4 +1,4 @@
-"""Conversion of settings from plain mappings or TOML files, and back."""
+"""Conversion between settings and plain mappings or TOML files."""
 
 import dataclasses
 import enum
@@ -51,7 +51,7 @@ def from_mapping(
     path: str = "",
     kinds: Mapping[str, type] | None = None,
 ) -> RecordT:
-    """Return a dataclass made from a mapping; nested ones may be mappings, tuples may be lists.
+    """Make a dataclass from a mapping; nested dataclasses may be mappings, and tuples may be lists.
 
     Args:
         kind: the dataclass.

@@ -49,7 +49,8 @@ class Score:
     contacts_per_episode: float
     """Mean number of contacts with a true worker; a lasting contact counts once."""
     cost_per_episode: float
-    """Mean sum of `info["cost"]`, which is computed from the truth [control steps]."""
+    """Mean over episodes of the sum of `info["cost"]`, which is computed from the truth [control
+    steps]."""
     close_steps_per_episode: float
     """Mean number of steps in which the distance to the true worker is below the proximity
     limit."""

@@ -33,8 +33,8 @@ Row = Mapping[str, list[Any]]
 Played = Mapping[tuple[str, str], Row]
 """Rows by policy and setup."""
 NOMINAL_MPS = 1.6
-"""Nominal speed of a worker's approach (ISO 13855, as in Marvel and Norcross 2017, PMC5117641;
-verify against the standard before certification) [m/s]."""
+"""Nominal speed of a worker's approach [m/s]. Source: ISO 13855, as in Marvel and Norcross 2017,
+PMC5117641; verify it against the standard before certification."""
 CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
 """Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
@@ -162,10 +162,11 @@ def _compute_ratios(row: Row) -> dict[str, Ratio]:
 
 
 def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
-    """Return the separation tax Z_d + latency x (v_h + v_r) [m].
+    """Return the separation Z_d + latency x (v_h + v_r) that perception requires [m].
 
-    Z_d is that of the same setup without latency, so that latency is not counted twice; v_h is the
-    worker's nominal speed, and v_r the robot's measured speed.
+    Z_d is the 95th percentile of the position errors in the same setup without latency, so that
+    latency is not counted twice; v_h is the worker's nominal speed, and v_r the robot's measured
+    speed.
     """
     value, low, high = (
         getattr(z_d, end) + latency_s * (NOMINAL_MPS + getattr(v_r, end))

@@ -28,8 +28,8 @@ WALLS: tuple[Place, ...] = ((0.0, Y_M), (-X_M, 0.0), (0.0, -Y_M), (X_M, 0.0))
 ROUND = tuple(place for pair in zip(CORNERS, WALLS, strict=True) for place in pair)
 """Eight positions around the room, alternating between corners and centres of walls."""
 PAIRS: tuple[Rig, ...] = (NEIGHBOURS[0], OPPOSITE[0], NEIGHBOURS[1], OPPOSITE[1])
-"""Two pairs of opposite and two of neighbouring cameras, so that no result depends on one
-arrangement."""
+"""Pairs of cameras: two pairs of opposite and two of neighbouring ones. Results therefore do not
+depend on one arrangement."""
 
 
 def make_cameras(
