@@ -20,9 +20,9 @@ from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
-"""Numbers (B,) by name; NaN where an environment has none in this step."""
+"""Numbers (B,) by name; NaN for environments in which a number does not exist in this step."""
 ABSENT = "absent"
-"""Activity and body of a worker that is not in the episode; its index is -1."""
+"""Name of the activity and of the body of a worker that is not in the episode; the index is -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
 CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 WORDS = {
@@ -31,9 +31,10 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Names in `OF_WORKERS` of the indices from which `name_indices` decodes each of its keys."""
+"""Keys that `name_indices` returns. The values are the names in `OF_WORKERS` of the indices that
+are decoded."""
 PEOPLE = ("activity", "body")
-"""Names of the words that every worker has."""
+"""Names in `OF_WORKERS` of the indices that every worker has."""
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
@@ -41,7 +42,7 @@ MORE_PEOPLE = "perception/more_people_than_slots"
 N_CAMERAS = "episode/n_cameras"
 MOVED, TURNED = "episode/max_camera_shift_m", "episode/max_camera_rotation_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
-"""Keys of the random draws of an episode."""
+"""Keys of properties that are sampled for each episode: delay, light, and the prefix for faults."""
 
 
 RENAMED = {
@@ -263,7 +264,7 @@ ENTRIES: dict[str, Entry] = {
     ),
     LIGHT: Entry("-", "drawn: strength of the light, 1 as built; at `pixels` and `keypoints`"),
 }
-"""Descriptions of the numbers by key, except reward terms and the numbers of each worker and each
+"""Descriptions of the numbers by key, without reward terms and the numbers of each worker and
 camera."""
 OF_WORKERS: dict[str, str] = {
     "activity": "activity of worker N, as an index; -1: not in the episode",
@@ -272,14 +273,15 @@ OF_WORKERS: dict[str, str] = {
     "motion in the step before: 0 towards the worker, 1 away, 2 neither; -1: none begins",
     "contact_region": "region of the body that this contact hits, as an index; -1: none",
 }
-"""Meanings of the keys `worker_N/NAME` by NAME; N counts from 0."""
+"""Meanings of the infos of worker N, which have the keys `worker_N/NAME`, by NAME; N is the
+worker's index."""
 OWN = Entry("-", "", 0.0)
-"""Description of a number that a user's task or shield returns."""
+"""Description of a number that a user's custom task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
 """Prefixes of keys that always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")
-"""Prefixes of keys that concern the robot's belief."""
+"""Prefixes of keys of numbers that depend on the robot's belief."""
 
 
 @cache
@@ -308,7 +310,7 @@ def publish(info: Info) -> Info:
 
 
 def is_of_belief(name: str) -> bool:
-    """Return whether an info concerns the robot's belief; all others describe the truth."""
+    """Return whether an info depends on the robot's belief; all others describe the truth."""
     return name.startswith(OF_BELIEF)
 
 
@@ -339,7 +341,10 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
 
 
 def of_workers(**parts: Ints) -> Info:
-    """Return one info per worker and name, from indices (B, W) named as in `OF_WORKERS`."""
+    """Return one info per worker and name.
+
+    The arguments are indices (B, W), named as in `OF_WORKERS`.
+    """
     return {
         f"worker_{w}/{name}": part[:, w].astype(np.int64)
         for name, part in parts.items()
