@@ -76,7 +76,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 def register_robot(robot: "Robot") -> None:
     """Register a robot under its name for `robot=` and `--robot`.
 
-    A warning lists visual geoms, which cameras see, that do not match the capsules, from which
+    A warning is issued if the visual geoms, which cameras see, differ from the capsules, with which
     distances are computed.
 
     Raises:
@@ -189,7 +189,7 @@ def adopt() -> None:
 
 
 def _import_file(path: Path, recorded: bool) -> None:
-    """Import a file unless it has been imported; child processes import it if it is `recorded`."""
+    """Import a file if it is new; child processes import it only if it is `recorded`."""
     from hrc_env.core.registry import FILES, importing, share
 
     name = f"hrc_env_import_{path.stem}"
@@ -215,7 +215,7 @@ def _import_file(path: Path, recorded: bool) -> None:
 
 
 def _add(table: "Registry[EntryT]", name: str, entry: EntryT, is_function: bool = False) -> None:
-    """Add an entry to a registry.
+    """Add an entry to a registry, after a check of its name.
 
     Args:
         table: the registry.
@@ -275,7 +275,7 @@ class Spec(EnvSpec):
 
 
 def make_spec(spec: EnvSpec) -> Spec:
-    """Return a specification with plain arguments, in which names replace registered objects."""
+    """Return a specification with plain arguments, which refers to registered objects by name."""
     from hrc_env.core.mapping import convert_to_plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS

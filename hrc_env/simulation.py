@@ -1,4 +1,4 @@
-"""The closed loop of a batch of environments: act, move, perceive, judge.
+"""Closed loop of a batch of environments: control, motion, perception and evaluation.
 
 `HRCEnv` is a simulation with a batch of one. The results of environment b depend only on the random
 streams of that environment, never on the size of the batch.
@@ -67,7 +67,7 @@ class Command:
     """Commands of the robots in a step."""
 
     velocities: JointVelocities
-    """(B, N) joint velocities that the shield allows [rad/s], of slides [m/s]."""
+    """(B, N) joint velocities that the shield allows [rad/s], or [m/s] for slides."""
     previous_action: Floats
     """(B, A) actions of the previous step."""
     shield_info: Info
@@ -158,11 +158,12 @@ class Simulation(Stateful):
         )
         self.physics = Physics(self.scene, batch)
         self.cameras = EpisodeCameras(batch, settings, self.scene)
-        """Cameras of every environment's episode."""
+        """Cameras and perception pipelines of the environments."""
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.reward_factors: dict[str, float] = {}
-        """Factors on terms of the reward by name; other terms have the factor 1."""
+        """Factors by which reward terms are multiplied, by name; all other terms have the factor
+        1."""
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
@@ -208,7 +209,7 @@ class Simulation(Stateful):
         return self._judge(command, truth, belief)
 
     def fix(self, options: Options) -> Fixed:
-        """Return the fixed parts of one environment's episode.
+        """Check the options of one environment's reset, and return the fixed parts of its episode.
 
         Raises:
             ConfigError: an option is invalid, or two options are incompatible.
@@ -235,8 +236,8 @@ class Simulation(Stateful):
 
         Args:
             weights: weights of the terms that all tasks share; None keeps them.
-            factors: factors on any terms by name, also on those of the task; all other terms have
-                the factor 1. None keeps the factors.
+            factors: factors by which terms are multiplied, by name, including terms of the task;
+                all other terms have the factor 1. None keeps the factors.
 
         Raises:
             ConfigError: a term is unknown, or a factor is not a finite number.
@@ -253,11 +254,11 @@ class Simulation(Stateful):
         self.reward_factors = self.reward_factors if checked is None else checked
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
-        """Return the rig of environment b's episode."""
+        """Return the rig of environment `b` in its current episode."""
         return self.cameras.rig_of(b)
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the pinhole cameras of environment b's episode, with their matrices."""
+        """Return the pinhole cameras of environment `b` in its current episode."""
         return self.cameras.cameras_of(b)
 
     def get_state(self) -> State:
@@ -282,7 +283,7 @@ class Simulation(Stateful):
         return self.cameras.draw_images(self.streams["sensor"])
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance drawn for environment b's episode; None for the scene as built."""
+        """Return the appearance sampled for environment `b`; None for the scene as built."""
         return self.cameras.look_of(b, self.streams["sensor"][b])
 
     def close(self) -> None:
@@ -328,7 +329,7 @@ class Simulation(Stateful):
         return self.task.markers(view)[0]
 
     def _make_people_and_scene(self, settings: Settings) -> None:
-        """Make the workers and the scene, or raise `ConfigError` if the space is insufficient."""
+        """Make the workers and the scene; raise `ConfigError` if it lacks space for workers."""
         config, (fewest, most) = settings.config, settings.n_workers
         build_scene = partial(
             build,
@@ -442,7 +443,7 @@ class Simulation(Stateful):
         return Truth(self._everyone, world, motion, workers, paths, task_step)
 
     def _show_workers(self, world: World, motion: WorkerMotion) -> WorkerProgress | None:
-        """Let workers see robot and signals; return their progress if they wait for signals."""
+        """Let workers observe robot and signals; return their progress if they wait for signals."""
         seen_world = world.robot.capsules_world[:, self.scene.watched_capsules, 1]
         signal = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, self.config.ctrl_dt, signal)
@@ -470,7 +471,7 @@ class Simulation(Stateful):
         return self._believe(ids, truth.world, estimates)
 
     def _expose(self, truth: Truth) -> None:
-        """Expose the sensor to the world; no other part of the perception has access to it."""
+        """Expose the sensor; no other part of the perception has access to the true state."""
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
@@ -483,8 +484,8 @@ class Simulation(Stateful):
 
         Args:
             ids: (n,) indices of the environments.
-            world: world of these environments, from which readings of encoders and grippers are
-                taken.
+            world: true state of these environments, from which only the readings of encoders and
+                grippers are used.
             estimates: estimate of the workers, and its forecasts.
         """
         estimate = estimates[0]
@@ -506,7 +507,7 @@ class Simulation(Stateful):
         return replace(belief, allowed_contact=self.task.allowed_contact(belief))
 
     def _open(self, truth: Truth, belief: Belief) -> StepResult:
-        """Return the observations and infos of episodes that begin."""
+        """Return the initial observations and infos of new episodes."""
         ids, task, world = truth.ids, self.task, truth.world
         present, nothing = self.present[ids], np.zeros(len(ids))
         identities = metrics.make_identities(*present.shape)
@@ -553,7 +554,7 @@ class Simulation(Stateful):
         return over.astype(bool)
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
-        """Return the initial joint angles (n, N) of robots `ids` (n,), drawn or given."""
+        """Return the initial joint angles (n, N) of robots `ids`, sampled or fixed by options."""
         rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
@@ -565,7 +566,7 @@ class Simulation(Stateful):
         return q
 
     def _load(self, world: World) -> World:
-        """Return a world in which carried loads are parts of the robots."""
+        """Return the true state with carried loads as parts of the robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
         return handling.attach_load(
             self.scene, world, arm, qpos, self.task.is_load(self.task_state)

@@ -40,7 +40,7 @@ class AppearanceConfig:
     """Ranges of the visual domain randomization; with the defaults nothing is randomized."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {"plain": "untextured"}
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     light: tuple[float, float] = (1.0, 1.0)
     """Minimum and maximum of the factor on the brightness of all light."""

@@ -51,7 +51,7 @@ class RigDistribution:
         "turn_rad": "max_rotation_rad",
         "focal_share": "max_focal_change",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     nominal: str | tuple[CameraConfig, ...] = ()
     """Nominal rig, given by its name ("lab_gopro") or its cameras; empty for the rig of the

@@ -85,7 +85,7 @@ class Robot:
         "watched": "watched_capsules",
         "girth_m": "base_radius_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     name: str
     """Name of the robot in `robot=`."""

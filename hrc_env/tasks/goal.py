@@ -66,7 +66,7 @@ class Goal:
     """Function of achieved goals (..., size), desired goals (..., size) and the task's settings
     that returns the rewards (...)."""
     doc: str
-    """Sentence about the reward for the environment's page."""
+    """Description of the reward for the environment's documentation page, in one sentence."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a function does not take the expected arguments."""
@@ -104,7 +104,7 @@ def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
-    """Return the reward term of a goal, computed from the observation; empty without a goal."""
+    """Return the reward term of a goal, computed from the observation, or () without a goal."""
     if goal is None:
         return ()
 
