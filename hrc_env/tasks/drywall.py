@@ -351,7 +351,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return step
 
     def effects(self, state: Records1[DrywallState]) -> Effects:
-        """Return the force of the screw that is being driven; four screws fix the board."""
+        """Return the force on the board while a screw is driven; the last screw fixes the board."""
         screw = np.minimum(state["driven"], len(SCREWS_M) - 1)
         rows = np.arange(len(state))
         push_n = np.where(state["boring"], state["push_n"][rows, screw], 0.0)
