@@ -259,7 +259,7 @@ def __getattr__(name: str) -> Any:
 
     Raises:
         AttributeError: the name is unknown, or it is a former name; the error suggests the most
-            similar name or the present one.
+            similar name or the current one.
     """
     if name in PUBLIC:
         value = globals()[name] = getattr(import_module(PUBLIC[name]), name)

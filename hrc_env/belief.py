@@ -58,14 +58,14 @@ class UnseenFloor:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """All information that is available to a robot in one step."""
+    """Information that is available to a robot in one step."""
 
     robot: RobotState
     """Joints, tool and surface of the robot, as measured by the robot's encoders."""
     estimate: PoseEstimate
     """(B, W, ...) estimate of the workers from the cameras' images."""
     separation: Separation
-    """(B, W) smallest gap between the robot and each *estimated* body."""
+    """(B, W) separation of the robot from each *estimated* body."""
     task: Any
     """The robot's knowledge about its task, as returned by `Task.view`."""
     action: Floats
@@ -125,7 +125,7 @@ def find_unseen_floor(
         vacancy: state of the floor; None without cameras.
 
     Returns:
-        The unseen floor; None without cameras.
+        The patches with their states and distances; None without cameras.
     """
     if vacancy is None:
         return None

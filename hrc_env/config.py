@@ -59,10 +59,11 @@ class HRCConfig:
     deviation averaged over the axes: "towards_robot", the standard deviation along the line to the
     robot; "factor", the six entries of the Cholesky factor; or both."""
     observe_shield: bool = False
-    """Whether the observation contains the shield's change of the last command."""
+    """Whether the observation contains the change of the last command by the shield."""
     worker: str | tuple[str, ...] = "worker_1"
-    """Body of the workers: a name, several names, or "any" for all bodies. From several bodies, one
-    is assigned to each worker in every episode; they differ from each other as far as possible."""
+    """Body of the workers: a name, several names, or "any" for all bodies. If there are several,
+    bodies are assigned to the workers in every episode, as far as possible a different one to
+    each."""
     scene: SceneConfig = field(default_factory=SceneConfig)
     """Settings of the scene, the cameras and the physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)

@@ -44,7 +44,7 @@ from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import TaskType, require_goal
 
 RENDER_MODES = ("rgb_array", "depth_array")
-"""Render modes of an environment."""
+"""Render modes of a single environment."""
 ENDLESS = 2**62
 """Number of remaining steps of an environment without a time limit. Gymnasium's wrapper `TimeLimit`
 enforces time limits."""
@@ -56,7 +56,7 @@ class EnvBase(HasSpec, Stateful):
     closed = False
     """Whether the environment has been closed."""
     PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
-    """Valid render modes."""
+    """Render modes that this class supports."""
 
     def _open(self, settings: Settings) -> None:
         """Store the settings, and check the rendering settings."""
@@ -78,7 +78,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns the reward.
+        """Callable (achieved_goal, desired_goal, info) that computes the reward of transitions.
 
         It takes one pair of goals (n,) and the info of its step, or many pairs (B, n) with a list
         of infos or the infos of a vector environment. With the info of a step it returns exactly
@@ -100,7 +100,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns whether the episode ended.
+        """Callable (achieved_goal, desired_goal, info) that determines whether episodes terminate.
 
         It takes the arguments of `compute_reward`. Reaching a goal does not end an episode; a
         contact ends it if `config.cost.contact_terminates` is true.
@@ -120,7 +120,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns False for each transition.
+        """Callable (achieved_goal, desired_goal, info) that returns False for each transition.
 
         Only the time limit truncates an episode.
 
@@ -130,7 +130,7 @@ class EnvBase(HasSpec, Stateful):
         return partial(goal.compute_terminated, require_goal(self._task))
 
     def _reward_factor(self, term: str) -> float:
-        """Return the factor on a term of the reward, which `set_reward` sets."""
+        """Return the factor of a reward term, as set by `set_reward`."""
         raise NotImplementedError
 
     def refuse_closed(self) -> None:

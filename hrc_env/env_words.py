@@ -132,7 +132,7 @@ class Option(NamedTuple):
     annotation: Any
     """Type of the option's words, annotated with the help text."""
     default: Any
-    """Default of the option's words."""
+    """Default of the option, before parsing."""
 
 
 def _options() -> list[Option]:

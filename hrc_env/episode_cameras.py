@@ -31,7 +31,7 @@ from hrc_env.scene.rig_distribution import draw_rig
 from hrc_env.settings import Settings
 
 ALL_DRAWN = Fixed()
-"""An episode without fixed parts."""
+"""Fixed parts of an episode in which all parts are sampled."""
 NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
 """Empty mapping of fixed parts, for episodes in which all parts are sampled."""
 NEUTRAL = {"darkness": 1.0}

@@ -24,8 +24,8 @@ def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: 
     Args:
         cost: the cost of the step.
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.
-        present: (B, W) whether each worker is in the scene.
-        config: parts of the cost.
+        present: mask (B, W) of the workers that are in the scene.
+        config: settings of the cost.
     """
     parts = split_cost(cost, happened, config)
     total = sum_cost(parts, config)
@@ -52,9 +52,9 @@ def reset_info(
     Args:
         robot: states of the robots.
         truth: true poses of the workers.
-        present: (B, W) whether each worker is in the scene.
+        present: mask (B, W) of the workers that are in the scene.
         terms: terms of the reward.
-        config: parts of the cost.
+        config: settings of the cost.
     """
     n = len(present)
     capsules = robot.capsules_world, robot.capsule_radius_m
@@ -97,7 +97,7 @@ def tracking_info(
     Args:
         estimate: estimate of the workers' poses.
         truth: true poses of the workers.
-        present: (B, W) whether each worker is in the scene.
+        present: mask (B, W) of the workers that are in the scene.
         identities: previous assignment of tracks to workers, which is updated in place.
     """
     errors = metrics.measure_errors(estimate, truth.joints_world, present, identities)

@@ -69,7 +69,7 @@ class ObservationTerm:
     """One block of the flat observation, computed as clip(function, -bound, bound) / scale."""
 
     name: str
-    """Name of the term in `split_observation` and on the environment's page."""
+    """Name of the term in `split_observation` and on the environment's documentation page."""
     size: int | Callable[[Sizes], int]
     """Number of entries, or a function that computes it from `Sizes`."""
     unit: str
@@ -83,8 +83,8 @@ class ObservationTerm:
     doc: str
     """Description of the term for the environment's documentation page, in one sentence."""
     function: Callable[[Belief], Floats]
-    """Function of a belief that returns an array (B, ...), which is flattened for each environment.
-    It is not called for a term without entries."""
+    """Callable that computes an array (B, ...) from a belief. The array is flattened for each
+    environment. The callable is not used for a term without entries."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take one argument."""
@@ -126,12 +126,12 @@ def _slides(belief: Belief, values: Floats) -> Floats:
 
 
 def _hand(belief: Belief) -> HandState:
-    """Return the state of the hand; raise an error if there is none."""
+    """Return the state of the hand, or raise an error if the robot has none."""
     return require(belief.hand, "A hand")
 
 
 def _objects(belief: Belief) -> ObjectState:
-    """Return the state of the loose objects; raise an error if there are none."""
+    """Return the state of the loose objects, or raise an error if there are none."""
     return require(belief.objects, "A loose object")
 
 

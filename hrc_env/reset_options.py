@@ -164,13 +164,13 @@ class Room:
     """Settings of an environment against which options are checked."""
 
     task: AnyTask
-    """The task."""
+    """Task of the environment."""
     scene: Scene
-    """The scene with the environment's rig."""
+    """Scene with the environment's rig."""
     chain: SerialChain
     """Kinematics of the robot."""
     level: str
-    """Perception level."""
+    """Perception level of the environment, as for `EnvConfig.perception`."""
     faults: tuple[FaultConfig, ...]
     """Faults of the environment's cameras."""
     appearance: AppearanceConfig
@@ -180,7 +180,7 @@ class Room:
     mind: BehaviourParams
     """Parameters of the workers' behaviour."""
     find_contact: Callable[[JointAngles], str | None]
-    """Function of joint angles that returns the names of two geoms in contact, or None."""
+    """Callable that returns the names of two geoms in contact at given joint angles, or None."""
     images: ObservedImages | None = None
     """Renderer of the images in observations; None without images."""
     wants_pairs: str = ""

@@ -58,15 +58,15 @@ KINDS = ("dense", "sparse")
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
-    """One term of the reward, which is the sum of all terms."""
+    """Term of the reward, which is the sum of all terms."""
 
     name: str
     """Name of the term; its value is `info["reward/NAME"]`."""
     doc: str
     """Description of the term for the environment's documentation page, in one sentence."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
-    """Function of (belief, step, previous action (B, A), weights) that returns the values (B,) of
-    the term. The step is the result of `Task.advance`. The weights are a `RewardConfig` for shared
+    """Callable (belief, step, previous action (B, A), weights) that computes the values (B,) of the
+    term. The step is the result of `Task.advance`. The weights are a `RewardConfig` for shared
     terms, and the task's settings for terms of the task. Useful fields of the belief are
     `separation.distance_m` (B, W), `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J,
     3), all in metres."""

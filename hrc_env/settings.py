@@ -50,7 +50,7 @@ class Settings:
     asked: EnvConfig
     """Arguments with which the environment was made."""
     task: AnyTask
-    """The task, an instance with its settings."""
+    """Instance of the task, with its settings."""
     estimator: EstimatorSpec
     """Specification of the estimator."""
     cameras: Any
@@ -64,7 +64,7 @@ class Settings:
     shield: Shield | None
     """Function of the shield; None for no shield."""
     config: HRCConfig
-    """All other settings."""
+    """Settings that are not keyword arguments of an environment."""
     images: ImageConfig | None = None
     """Settings of the camera images in the observation; None for no images."""
     rigs: RigDistribution | None = None
@@ -95,7 +95,7 @@ class Settings:
 
 
 def resolve_settings(**arguments: Any) -> Settings:
-    """Return checked settings for keyword arguments of an environment, like `make_settings`."""
+    """Return the checked settings for keyword arguments of an environment."""
     return make_settings(EnvConfig(**arguments))
 
 

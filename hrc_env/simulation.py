@@ -76,7 +76,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The true state of the world for sensors, task, cost and metrics; beliefs never read it."""
+    """True state of the world for sensors, task, cost and metrics, which beliefs never contain."""
 
     ids: Ints
     """(B,) index of the environment of each row."""
@@ -168,7 +168,8 @@ class Simulation(Stateful):
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
         self.estimates = tuple(oracle.estimate_prior(*made) for _ in (0.0, *config.forecast_s))
-        """Estimates of the workers: the present one, and a forecast for each of `forecast_s`."""
+        """Estimates of the workers: the current estimate, and a forecast for each of
+        `forecast_s`."""
         self.identities = metrics.make_identities(batch, self.scene.n_workers)
         self.keys: list[str] = []
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
@@ -302,7 +303,7 @@ class Simulation(Stateful):
 
     @property
     def estimate(self) -> PoseEstimate:
-        """Present estimate of the workers."""
+        """Current estimate of the workers."""
         return self.estimates[0]
 
     @property
@@ -313,12 +314,12 @@ class Simulation(Stateful):
 
     @property
     def present(self) -> Bools:
-        """(B, W) whether each worker is in the scene."""
+        """Mask (B, W) of the workers that are in the scene."""
         return generator.activity(self.motion) != generator.ABSENT
 
     @property
     def belief(self) -> Belief:
-        """Present belief of every robot."""
+        """Current belief of every robot."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world = handling.make_world(self.physics, self._everyone, robot)
         return self._believe(self._everyone, self._load(world), self.estimates)

@@ -25,9 +25,9 @@ class StepResult:
     reward: Floats
     """(B,) rewards of the step."""
     terminated: Bools
-    """(B,) whether each episode has terminated."""
+    """Mask (B,) of the environments in which the episode has terminated."""
     info: Info
-    """Infos (B,) by name."""
+    """Entries of the info: arrays (B,) by name."""
 
     def info_of(self, b: int) -> InfoDict:
         """Return the info of one environment with NumPy scalars as values."""

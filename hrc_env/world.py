@@ -119,13 +119,13 @@ class WorkerProgress:
     """Progress of workers in their part of a task."""
 
     present: Bools
-    """(B, W) whether each worker is in the scene."""
+    """Mask (B, W) of the workers that are in the scene."""
     screws: Ints
     """(B, W) number of screws that each worker has driven."""
     boring: Bools
-    """(B, W) whether each worker is driving a screw."""
+    """Mask (B, W) of the workers that are driving a screw."""
     takes: Bools
-    """(B, W) whether each worker extends a hand to take an object that the robot brings."""
+    """Mask (B, W) of the workers that extend a hand to take an object from the robot."""
     grip_world: Points3
     """(B, W, 3) position of the grip point of each worker's active hand [m]."""
     grip_velocity_world: Velocities3
@@ -135,7 +135,7 @@ class WorkerProgress:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class WorkerSignal:
-    """A task's signal to the workers that wait for it."""
+    """Signal of a task to the workers that wait for it."""
 
     stage: Ints
     """(B,) stage of the task: 0 while workers wait, 1 when they may begin, 2 after one of them has
@@ -146,7 +146,7 @@ class WorkerSignal:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The true state of robots and objects, by which a task is judged; a row per environment."""
+    """True state of robots and objects for the evaluation of a task, with a row per environment."""
 
     robot: RobotState
     """Joints and tool of the robot, as measured by the robot's encoders."""
@@ -158,8 +158,8 @@ class World:
     """Progress of workers that wait for signals (`Task.signal`); None if no worker waits, and at
     the start of an episode."""
     touched: Bools | None = None
-    """(B,) whether the robot touched a worker in this step. This is true state: use it to determine
-    the success of an episode, but not for a reward or an observation."""
+    """Mask (B,) of the environments in which the robot touched a worker in this step. This is true
+    state: use it to determine the success of an episode, but not for a reward or an observation."""
     place: Any = None
     """The task's map of the scene, as returned by `Task.survey`."""
 
@@ -169,6 +169,6 @@ class Effects:
     """Welds and external forces that a task applies to its loose objects in a step."""
 
     welded: Mapping[str, Bools]
-    """(B,) whether each of the task's welds is active, by its name."""
+    """Mask (B,) of the environments in which a weld of the task is active, by name of the weld."""
     push_world: Floats
     """(B, O, 6) force [N] and torque [Nm] at the centre of each object, in the world frame."""

@@ -95,7 +95,7 @@ class Recipe(NamedTuple):
     cameras: tuple[str, ...]
     """Names of the cameras in use."""
     robot: Robot
-    """The robot."""
+    """Robot in the scene."""
     task_scene: TaskScene
     """The task's part of the scene."""
 
@@ -111,7 +111,7 @@ class Scene:
     n_workers: int
     """Number of workers in the model, W."""
     robot: Robot
-    """The robot."""
+    """Robot in the scene."""
     bodies: tuple[str, ...]
     """Names of the bodies that the workers can have; `model` contains the capsules of the first
     body."""

@@ -48,7 +48,7 @@ KEPT_BYTES = 2**28
 class ImageConfig:
     """Settings of the camera images that an observation also contains (`observe_images`).
 
-    Each image is the present view of a camera of the rig, with its lens and the episode's
+    Each image is the current view of a camera of the rig, with its lens and the episode's
     appearance, but without faults, delays and shadows. It is the camera's whole image, scaled to
     `height` x `width`; it is black if the camera is not in the episode's rig. A mapping of these
     fields or a tuple (height, width) is also accepted.

@@ -80,7 +80,7 @@ class Marks:
 
 
 class Spheres(NamedTuple):
-    """Spheres in the world."""
+    """Centres and radii of spheres in the world frame."""
 
     centre_world: Points3
     """(N, 3) centres [m]."""
@@ -157,7 +157,7 @@ class Canvas:
         self._fresh.clear()
 
     def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the part of the scene that the next pictures show, in the present pose."""
+        """Choose the part of the scene that the next pictures show, in the current pose."""
         self._open()
         if part not in self._lists:
             self._lists[part] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)

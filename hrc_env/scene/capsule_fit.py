@@ -28,7 +28,7 @@ WALLS = 5
 """Number of axis directions, out of six, in which a ray from an inner cell must meet the surface.
 With this number, an open-ended tube has inner cells, and the corner of an L has none."""
 LINES = 8000
-"""Number of random lines for capsules."""
+"""Number of random lines along which capsules are fitted."""
 MIDDLES = 1000
 """Number of points that the random lines connect."""
 COUNTED = 1000
@@ -112,7 +112,7 @@ def _measure_depths(points_m: Points3) -> _Depths:
 
 
 def _draw_lines(depths: _Depths, out_m: float, rng: np.random.Generator) -> list[Rod]:
-    """Return the thickest capsules along random lines that protrude by `out_m` [m]."""
+    """Return the thickest capsules along random lines that protrude by at most `out_m` [m]."""
     middles = depths.middles()[depths.depth_m + out_m > LEAST_RADIUS_M]
     middles = middles[rng.permutation(len(middles))[:MIDDLES]]
     start, end = middles[rng.integers(len(middles), size=(2, LINES))]

@@ -63,7 +63,7 @@ def attach_load(
         world: state of the B robots and their objects.
         path_world: (B, T, K, 2, 3) capsules of the robots after every substep [m].
         q_path: (B, T, nq) `qpos` after every substep.
-        is_load: (B, O) whether each object counts as part of the robot while it is held.
+        is_load: mask (B, O) of the objects that count as part of the robot while they are held.
     """
     if world.objects is None:
         return LoadedRobot(world, path_world)

@@ -41,8 +41,8 @@ GRIP_M = 0.01
 def add_task_scene(spec: mujoco.MjSpec, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
     """Add a task's bodies to a scene that is being built.
 
-    Friction cones are elliptic, for which gripped objects slip least: 8 mm in 6 s for 5 kg that are
-    shaken at 3 m/s^2, instead of 31 mm with MuJoCo's defaults.
+    Elliptic friction cones are used, because they reduce the slip of gripped objects to a minimum:
+    8 mm in 6 s for 5 kg that are shaken at 3 m/s^2, instead of 31 mm with MuJoCo's defaults.
 
     Args:
         spec: specification of the scene.
@@ -193,7 +193,7 @@ def make_object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools)
         objects: the O objects.
         qpos: (B, nq) generalized positions.
         qvel: (B, nv) generalized velocities.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
     """
     poses, n = objects.poses(qpos), len(objects.names)
     rates = qvel[:, objects.first : objects.first + RATE * n].reshape(len(qvel), n, RATE)
@@ -227,7 +227,7 @@ def attach_objects(
         path_world: (B, T, K, 2, 3) capsules of the robots along a path [m].
         objects: the O objects.
         q_path: (B, T, nq) `qpos` along the path.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
     """
     if not objects.names:
         return LoadedArm(robot, path_world)
@@ -274,7 +274,7 @@ def _find_held(
         poses: (B, O, 7) poses of the boxes, position [m] and quaternion (w, x, y, z).
         half_size: (O, 3) half edge lengths of the boxes [m].
         tool_world: (B, 3) tool points [m].
-        closed_on: (B,) whether the fingers have closed on something.
+        closed_on: mask (B,) of the environments in which the fingers have closed on an object.
         held: (B, O) output, in which the entry of the held box is set to true.
     """
     for b in range(len(poses)):
@@ -298,7 +298,7 @@ def _place_loads(poses: Floats, capsules: Capsules, held: Bools, loads: Floats) 
     Args:
         poses: (B, T, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
         capsules: (O, n, 2, 3) capsules of the objects in the body frames [m]; unused rows are NaN.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
         loads: (B, T, O, n, 2, 3) output, which is filled [m].
     """
     for b, t, o in np.ndindex(poses.shape[:3]):

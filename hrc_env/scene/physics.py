@@ -31,9 +31,9 @@ INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjST
 """MuJoCo's state flags of the inputs of a substep with workers: servo commands and poses of worker
 bodies."""
 ARM_FIELDS = ("time", "qpos", "qvel", "act", "qacc_warmstart")
-"""Fields of the state that determine the motion of the robot."""
+"""Fields of MuJoCo's state that determine the motion of the robot."""
 OBJECT_FIELDS = ("eq_active", "xfrc_applied")
-"""Further fields that determine the motion of loose objects."""
+"""Further fields of MuJoCo's state that determine the motion of loose objects."""
 PRESSING_N = 40.0
 """Force above which fingers count as pressing on an object [N]."""
 RESTING_M_S = 0.01
@@ -82,7 +82,7 @@ class Saved(NamedTuple):
     """Content of a pickled `Physics` object."""
 
     scene: Scene
-    """The scene."""
+    """Scene of the simulations."""
     batch: int
     """Number of simulations, B."""
     state: Floats
@@ -319,7 +319,7 @@ class Physics:
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
     def _simulate(self, is_selected: Bools, workers: WorkerPath | None) -> None:
-        """Simulate selected environments (B,) with workers or, if they are None, without."""
+        """Simulate selected environments (B,), without workers if `workers` is None."""
         n = np.count_nonzero(is_selected)
         if n == 0:
             return
@@ -399,7 +399,7 @@ def _substep_commands(
         qd: (B, N) joint velocities [rad/s].
         held: (B, N) angles of the holding servos [rad]; they are kept near those of a blocked
             robot, so that it can move immediately afterwards.
-        command: (B, N) present command [rad/s], which is advanced by the control step.
+        command: (B, N) current command [rad/s], which is advanced by the control step.
         wanted: (B, N) desired velocities [rad/s]; values that are not finite count as 0.
         servos: (N,) limits and servo parameters of the joints.
         sim_dt: duration of a substep [s].

@@ -47,7 +47,7 @@ KINDS = {
 LEFT_AT = {"pile": "box", "floor": "box", "cart": "cart"}
 """Prop that may be on the floor at a workplace, by kind of workplace."""
 Footprint = tuple[float, float, float, float, float]
-"""Type of a row of `Grounds.blocked`."""
+"""Type of the footprint of an obstacle, a row of `Grounds.blocked`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ SCENES: dict[str, Room] = {
     path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
-"""Scenes by name."""
+"""Descriptions of the scenes by name."""
 
 
 def block_loads(grounds: Grounds, obstacles: Floats) -> Grounds:
@@ -199,7 +199,7 @@ def _half_extent(row: Floats) -> Floats:
 
 
 def is_within(points: Floats, footprints: Floats) -> Bools:
-    """Return a mask (N,) of the points x, y, ... (N, 2 or more) in any of footprints (M, 5)."""
+    """Return a mask (N,) of the points (N, 2 or more) that are inside any footprint (M, 5)."""
     x, y, half_length, half_width, yaw = footprints.T
     dx, dy = points[:, :1] - x, points[:, 1:2] - y
     along, aside = np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx

@@ -88,7 +88,7 @@ class Robot:
     """Current names of renamed fields, by former name."""
 
     name: str
-    """Name of the robot in `robot=`."""
+    """Name of the robot, as used in `robot=`."""
     mjcf: str | Path
     """Path of the MJCF file, or its text."""
     joints: tuple[str, ...]
@@ -108,9 +108,9 @@ class Robot:
     """Pairs (capsule, geom of a scene) that are close in every pose; collisions between them are
     disabled."""
     hand: Hand | None = None
-    """The gripper; None for a robot without a gripper."""
+    """Gripper of the robot; None for a robot without a gripper."""
     suction: Suction | None = None
-    """The suction cups; None for a robot without suction cups."""
+    """Suction cups of the robot; None for a robot without suction cups."""
     drives: bool = False
     """Whether the robot drives on the floor; its base frame is then at the world's origin, and
     otherwise on the scene's pedestal."""
@@ -168,7 +168,7 @@ ROBOTS: Registry[Robot] = Registry(
     "robot",
     {path.stem: _read_robot(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))},
 )
-"""Robots by name: those in `assets/robots`, and registered ones."""
+"""Robots by name: the built-in robots in `assets/robots`, and registered robots."""
 BUILT_IN = frozenset(ROBOTS.data.values())
 """Robots in `assets/robots`. None of their capsules extends beyond the visual geoms by more than
 `BARE_M`."""

@@ -139,7 +139,7 @@ class DeliveryStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining path became shorter [m]."""
+    """Decrease of the length of the remaining path in this step [m]."""
     hit: bool
     """Whether a contact of the base with an obstacle began in this step."""
     delivered: bool
@@ -200,7 +200,7 @@ def _follow_ways(q: Floats, ways: Floats, origin: Floats, states: Records1[Deliv
 
 
 class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
-    """Bring material across a construction site, among the workers, and hit nothing."""
+    """Transport material across a construction site without hitting obstacles or workers."""
 
     id = "HRCDelivery-v0"
     config_type = DeliveryConfig

@@ -160,7 +160,7 @@ class ScrewProgress(NamedTuple):
     driven: Ints
     """(B,) number of screws that have been driven."""
     boring: Bools
-    """(B,) whether a screw is being driven."""
+    """Mask (B,) of the environments in which a screw is being driven."""
 
 
 def measure_offset(board: ObjectState) -> BoardOffset:
@@ -184,7 +184,7 @@ def _measure_ways(
         board_world: (B, 3) centres of the boards [m].
         R: (B, 3, 3) rotations world_from_board.
         tool_world: (B, 3) tool points of the robots [m].
-        is_taken: (B,) whether the tool has already reached the board.
+        is_taken: mask (B,) of the boards that the tool has reached.
     """
     away_m = np.linalg.norm(board_world - (FOOT_WORLD + PLACE_M), axis=-1)
     away_m = away_m + RADIAN_M * _measure_turn(R)
@@ -363,7 +363,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
     def signal(self, state: Records1[DrywallState]) -> WorkerSignal:
-        """Return the signal with which workers may begin: the board is pressed in position."""
+        """Return the signal to workers, which may work while the board is in position."""
         return WorkerSignal(
             (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
         )

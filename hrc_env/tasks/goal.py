@@ -59,12 +59,12 @@ class Goal:
     bound: float
     """Largest magnitude of an entry; larger values are clipped."""
     achieved: Callable[[Belief], Floats]
-    """Function of the belief that returns the achieved goals (B, size), as known to the robot."""
+    """Callable that computes the achieved goals (B, size), as known to the robot, from a belief."""
     desired: Callable[[Belief], Floats]
-    """Function of the belief that returns the desired goals (B, size)."""
+    """Callable that computes the desired goals (B, size) from a belief."""
     reward: Callable[[Floats, Floats, Any], Floats]
-    """Function of achieved goals (..., size), desired goals (..., size) and the task's settings
-    that returns the rewards (...)."""
+    """Callable that computes the rewards (...) from achieved goals (..., size), desired goals (...,
+    size) and the task's settings."""
     doc: str
     """Description of the reward for the environment's documentation page, in one sentence."""
 

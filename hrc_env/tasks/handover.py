@@ -154,11 +154,11 @@ class HandoverView:
     meet_world: Points3
     """(3,) position near which the worker extends a hand [m]."""
     taken: Bools
-    """(B,) whether the worker has taken the tool, which the robot can feel."""
+    """Mask (B,) of the tools that the worker has taken, which the robot can sense."""
 
 
 class Handle(NamedTuple):
-    """Motion of the tools' handles."""
+    """Position and velocity of the tools' handles."""
 
     position_world: Points3
     """(B, 3) position of each handle [m]."""
@@ -246,8 +246,10 @@ def _measure_ways(
         tool_middle: (B, 3) centres of the tools [m].
         handle: (B, 3) positions of the handles [m].
         tool_world: (B, 3) tool points of the robots [m].
-        held: (B,) whether the robot holds the tool, for which the distance of the fingers is 0.
-        taken: (B,) whether the worker has taken the tool, for which the remaining distance is 0.
+        held: mask (B,) of the tools that the robot holds; for these, the distance of the fingers is
+            0.
+        taken: mask (B,) of the tools that the worker has taken; for these, the remaining distance
+            is 0.
     """
     to_tool_m = _measure_fingers_gap(tool_world, tool_middle)
     to_hand_m = np.linalg.norm(handle - (FOOT_WORLD + MEET_M), axis=-1)

@@ -11,8 +11,8 @@ from hrc_env.world import FOOT_WORLD
 ARMS = ((6, 14), (7, 15))
 """Indices of forearm and hand of each side in `geometry.distances.segments`."""
 PARTNER_RADIUS_M = 0.6
-"""Maximum horizontal distance from the workplace of the trunk of a worker that takes part in the
-task [m]."""
+"""Maximum horizontal distance between workplace and trunk for a worker to count as the partner
+[m]."""
 
 
 def find_partner_arms(

@@ -36,7 +36,7 @@ PLACES_WORLD = FOOT_WORLD + np.array(PLACES_M)
 STACK = Workplace("stack", "task", (1.025, -0.62), np.pi, SURFACE_M, loads=("stud",) * 4)
 """Workplace where the worker takes pieces from the other end of the table."""
 TRESTLE = Workplace("trestle", "bench", (2.10, -1.50), 0.0, SURFACE_M)
-"""Workplace where the worker puts these pieces down."""
+"""Workplace where the worker puts down the pieces that were taken from the table."""
 ROW_M = 0.12
 """Initial spacing of the pieces in the row [m]."""
 ASIDE_M = 0.02
@@ -109,7 +109,7 @@ class PickPlaceView:
     """Information about the task that is available to the robots."""
 
     placed: Bools
-    """(B, 3) whether each piece is at rest in its target pose and released."""
+    """Mask (B, 3) of the pieces that are at rest in their target pose and released."""
     places_world: Points3
     """(3, 3) target position of each piece's centre [m, world]."""
 

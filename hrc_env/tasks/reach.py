@@ -61,11 +61,11 @@ class ReachState:
     """State of one environment's goals."""
 
     goal_world: Annotated[Points3, (3,)]
-    """Position of the present goal [m]."""
+    """Position of the current goal [m]."""
     goal_age_s: float
-    """Time since the present goal appeared [s]."""
+    """Time since the current goal appeared [s]."""
     distance_m: float
-    """Distance of the tool point from the present goal [m]."""
+    """Distance of the tool point from the current goal [m]."""
     n_reached: int
     """Number of goals that were reached in this episode."""
     n_missed: int
@@ -92,9 +92,9 @@ class ReachView:
     """Information about the task that is available to the robots."""
 
     goal_world: Points3
-    """(B, 3) position of the present goal [m]."""
+    """(B, 3) position of the current goal [m]."""
     time_left_s: Floats
-    """(B,) remaining time until the present goal is missed [s]."""
+    """(B,) remaining time until the current goal is missed [s]."""
 
 
 @kernel
@@ -318,5 +318,5 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         }
 
     def markers(self, view: ReachView) -> Points3:
-        """Return the positions (B, 1, 3) of the present goals [m]."""
+        """Return the positions (B, 1, 3) of the current goals [m]."""
         return view.goal_world[:, None]
