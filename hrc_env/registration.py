@@ -95,14 +95,18 @@ def register_robot(robot: "Robot") -> None:
 
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
-    """Register a pose detector for `config={"detector": {"keypoints": name}}` at "pixels".
+    """Register a pose detector under a name for the setting `detector.keypoints`.
+
+    It is used by an environment with perception="pixels" and `config={"detector": {"keypoints":
+    name}}`.
 
     Args:
         name: name of the detector.
-        make: function without arguments that is called once in each detection thread. It returns a
-            function of a crop (256, 256, 3), RGB of uint8. That function returns an array (15, 3)
-            with x, y [px] from the crop's corner and confidence in [0, 1] of each of `JOINTS`, or
-            NaN, NaN, 0 for an undetected joint; it returns None if no person is detected.
+        make: callable without arguments, which is called once in each detection thread and returns
+            the detector. The detector is a callable that takes a crop (256, 256, 3), RGB of uint8.
+            It returns an array (15, 3) with x, y [px] from the crop's corner and confidence in [0,
+            1] of each of `JOINTS`, or NaN, NaN, 0 for an undetected joint; it returns None if no
+            person is detected.
 
     Raises:
         ConfigError: the name is already in use, or `make` is not such a function.

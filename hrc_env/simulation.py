@@ -56,8 +56,8 @@ CLOSING_M_S = 8.0
 """Upper bound on the speed at which robot and worker approach each other [m/s]. The maximum in
 about 290,000 steps of robots that moved back and forth at their limits was 3.4."""
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
-"""Random streams of an environment, in the order in which their generators are spawned. They are
-separate, so that the workers' motion does not depend on the perception."""
+"""Random streams of an environment, in the order in which their generators are spawned. Separate
+streams make the workers' motion independent of the perception."""
 MEASURING = "objects"
 """Random stream for measurements of loose objects, spawned from that of the task."""
 
@@ -524,7 +524,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), nothing, nothing > 0, info)
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
-        """Compute cost and metrics from the truth, and reward and observation from the belief."""
+        """Compute cost and metrics from the true state, reward and observation from the belief."""
         config, paths = self.config, require(truth.paths, "A step's paths")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)

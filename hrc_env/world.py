@@ -151,7 +151,7 @@ class World:
     robot: RobotState
     """Joints and tool of the robot, as measured by the robot's encoders."""
     hand: HandState | None = None
-    """State of the gripper; None for an arm without a gripper."""
+    """State of the hand; None for a robot without a hand."""
     objects: ObjectState | None = None
     """True poses and velocities of the task's loose objects; None for a task without objects."""
     workers: WorkerProgress | None = None

@@ -121,7 +121,7 @@ class Scene:
     chain: SerialChain
     """Kinematics and capsules of the robot."""
     cameras: tuple[PinholeCamera, ...]
-    """Cameras in use."""
+    """Pinhole cameras in use."""
     home_q: JointAngles
     """(N,) home pose of the robot [rad]."""
     servo_lead_s: Floats
@@ -140,7 +140,7 @@ class Scene:
     map: Grounds
     """Floor plan that mobile bases know, in which the pedestal and the loads are also obstacles."""
     objects: Objects
-    """Loose objects."""
+    """Loose objects of the task."""
     grip: Grip | None
     """The robot's fingers; None for a robot without fingers."""
     cups: Cups | None
@@ -222,7 +222,7 @@ def all_grounds(config: SceneConfig | None = None) -> dict[str, Grounds]:
 
 @lru_cache(maxsize=8)
 def _build(recipe: Recipe) -> Scene:
-    """Compile the scene of a recipe."""
+    """Compile the scene that a recipe describes."""
     robot, n_workers = recipe.robot, recipe.n_workers
     chain = make_chain(robot, _foot_world(robot, recipe.name))
     spec = _make_spec(recipe)

@@ -164,7 +164,10 @@ def _describe_one_camera(wants_pairs: str) -> str:
 
 
 def describe_poor_cameras(scene: Scene) -> list[str]:
-    """Return descriptions of cameras in obstacles or with too small views, one sentence each."""
+    """Return descriptions of poorly placed cameras, one sentence each.
+
+    Such a camera is in an obstacle or sees too small a fraction of the workspace.
+    """
     sentences: list[str] = []
     for camera, share in zip(scene.cameras, _visible_shares(scene), strict=True):
         inside = _is_inside_obstacle(camera, scene.obstacles)
