@@ -97,8 +97,8 @@ def register_robot(robot: "Robot") -> None:
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
     """Register a pose detector under a name for the setting `detector.keypoints`.
 
-    It is used by an environment with perception="pixels" and `config={"detector": {"keypoints":
-    name}}`.
+    An environment with perception="pixels" uses it with the argument
+    `config={"detector": {"keypoints": name}}`.
 
     Args:
         name: name of the detector.
