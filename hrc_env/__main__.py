@@ -1,4 +1,4 @@
-"""The command line, `python -m hrc_env`: set up, play, train and evaluate.
+"""Command-line interface `python -m hrc_env` for setup, playing, training and evaluation.
 
 The module of a command is imported only when the command is called, which keeps the start fast.
 """
@@ -66,13 +66,13 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
     ),
 }  # fmt: skip
-"""Module, class and first sentence of the class's docstring, by command."""
+"""Module and class of each command, and the first sentence of the class's docstring, by name."""
 MOVED = {
     "bench": "python -m benchmarks",
     "gallery": "python -m benchmarks gallery",
     "calibrate-keypoints": "python -m assets.emulator.calibrate",
 }
-"""Commands in a clone of the repository that replace former commands, by their former names."""
+"""Replacements of former commands, by former name. They require a clone of the repository."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
