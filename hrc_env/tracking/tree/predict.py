@@ -349,37 +349,49 @@ def _are_legs_along_trunk(body: Floats, root: TorsoState, offset: Floats, axes: 
 
 @functools.lru_cache(maxsize=16)
 def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> JointMotion:
-    """Return the exact discretisation of damped joints over a time step.
+    """Return the exact motion of underdamped joints over a time step.
+
+    On each axis, the displacement of a joint from its anchor is a damped oscillator driven by white
+    noise. Its stationary standard deviations are `SPREAD_M` for the displacement and `SPEED_M_S`
+    for its rate of change, which determine the natural frequency.
 
     Args:
         dt_s: the time step [s].
-        damping: damping ratio, in (0, 1).
-        root_acceleration: spectral density of the whole body's acceleration [m^2/s^3].
+        damping: damping ratio of the oscillators, in (0, 1).
+        root_acceleration: spectral density of the acceleration of the whole body [m^2/s^3].
 
     Returns:
-        The transition relative to the anchor, and process noise that maintains the stationary
-        variances and adds the acceleration of the whole body.
+        (J, 2, 2) transition matrices of displacement and velocity, and (J, 2, 2) covariances of the
+        process noise. The noise is the sum of two parts: the noise of the oscillators, which keeps
+        their variances stationary, and the noise from `make_shared_noise`.
     """
-    frequency = SPEED_M_S / SPREAD_M
-    damped = frequency * np.sqrt(1 - damping**2)
-    decay, cos, sin = (
-        np.exp(-damping * frequency * dt_s),
-        np.cos(damped * dt_s),
-        np.sin(damped * dt_s),
-    )
-    slope = damping * frequency / damped * sin
-    F = np.empty((len(frequency), 2, 2))
-    F[:, 0, 0], F[:, 0, 1] = decay * (cos + slope), decay * sin / damped
-    F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
-    stationary = np.zeros_like(F)
-    stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
-    noise = stationary - F @ stationary @ F.swapaxes(1, 2)
-    noise += make_shared_noise(dt_s, root_acceleration)
-    return JointMotion(F, noise)
+    natural_rad_s = SPEED_M_S / SPREAD_M  # (J,) undamped angular frequencies
+    damped_rad_s = natural_rad_s * np.sqrt(1 - damping**2)  # (J,)
+    decay = np.exp(-damping * natural_rad_s * dt_s)  # (J,) decrease of the amplitudes
+    cos = np.cos(damped_rad_s * dt_s)
+    sin = np.sin(damped_rad_s * dt_s)
+    damped_sin = damping * natural_rad_s / damped_rad_s * sin
+
+    F = np.empty((len(natural_rad_s), 2, 2))  # the order on both axes is displacement, velocity
+    F[:, 0, 0] = decay * (cos + damped_sin)
+    F[:, 0, 1] = decay * sin / damped_rad_s
+    F[:, 1, 0] = -decay * natural_rad_s**2 / damped_rad_s * sin
+    F[:, 1, 1] = decay * (cos - damped_sin)
+
+    stationary = np.zeros_like(F)  # (J, 2, 2) stationary covariances, F S F' + Q = S
+    stationary[:, 0, 0] = SPREAD_M**2
+    stationary[:, 1, 1] = SPEED_M_S**2
+    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
+    Q += make_shared_noise(dt_s, root_acceleration)
+    return JointMotion(F, Q)
 
 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
-    """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s]."""
+    """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s].
+
+    It is that of position and velocity on one axis if the acceleration of the whole body is white
+    noise of spectral density `root_acceleration` [m^2/s^3].
+    """
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
