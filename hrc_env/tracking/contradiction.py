@@ -23,19 +23,19 @@ from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays
 from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 SEEN_WELL = 0.5
-"""Confidence from which a detected joint must be explained by a track."""
+"""Minimum confidence of a detected joint that a track must explain."""
 LEAST_JOINTS = 4
-"""Number of confident joints from which a pose must be explained by a track."""
+"""Minimum number of confident joints in a pose that a track must explain."""
 EXPLAINED_M = 0.15
-"""Distance across the line of sight within which a detection fits a track's joint [m]."""
+"""Maximum distance of a track's joint from the line of sight of a detection that fits it [m]."""
 SIGMAS = 4.0
-"""Distance within which a detection fits a track's joint, in standard deviations of the
+"""Maximum distance of a track's joint from a detection that fits it, in standard deviations of the
 detection."""
 SMALLEST_M = 0.95
-"""Total length of trunk, thigh and shank of the smallest person [m]. That of adults is 1.15 to
-1.55 m."""
+"""Total length of trunk, thigh and shank of the smallest plausible person [m]. The length is 1.15
+to 1.55 m for adults."""
 LARGEST_M = 1.8
-"""Total length of trunk, thigh and shank of the largest person [m]."""
+"""Total length of trunk, thigh and shank of the largest plausible person [m]."""
 CHAIN = tuple(JOINT[f"left_{name}"] for name in ("shoulder", "hip", "knee", "ankle"))
 """Indices of the left shoulder, hip, knee and ankle; the index of the right one is one higher."""
 

@@ -25,8 +25,8 @@ _NEVER = 2**41
 _HELD_S = 0.1
 """Largest age of a frame that is reused with a newer frame of another camera [s]."""
 _DRIFT_PX_S = 300.0
-"""Speed of a walking person in the image, by which detections in a reused frame become less certain
-[px/s]."""
+"""Speed of a walking person in the image, which is the growth rate of the standard deviation of
+detections in a reused frame [px/s]."""
 
 
 class Frames(NamedTuple):
@@ -50,7 +50,7 @@ class FrameSet(NamedTuple):
     keypoints: Keypoints
     """(G, C, W, J, ...) keypoints; missing where a camera has no frame."""
     has: Bools
-    """(G, C) whether the camera has a frame."""
+    """(G, C) whether the camera has a frame in the set."""
     at_s: Floats
     """(G,) time of the frames [s]."""
 
@@ -152,7 +152,7 @@ def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> It
 
 
 def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
-    """Complete a set with the last frames of other cameras for some workers; return its keypoints.
+    """Return the keypoints of a set, completed with other cameras' last frames for some workers.
 
     Two views that are slightly out of synchronisation locate a worker better than one view alone.
     The standard deviations of detections in an older frame grow by the distance that a walking

@@ -49,7 +49,7 @@ def leave_out_frozen(state: Records2[LastImage], ids: Ints, keypoints: Keypoints
     Args:
         state: (B, C) records of the whole batch.
         ids: (b,) indices of the environments to which the keypoints belong.
-        keypoints: (b, C, W, J) keypoints. Cameras without a new image must report none.
+        keypoints: (b, C, W, J) keypoints. They must be missing for cameras without a new image.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 

@@ -31,14 +31,14 @@ MIN_SIGMA_PX = 0.25
 """Smallest standard deviation of a detection that is used [px]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 _MIRROR = tuple(int(j) for j in MIRROR)
-"""Index of the same joint on the other side of the body."""
+"""Index of each joint's counterpart on the other side of the body."""
 _UNSEEN_UPDATES = 8
 """Number of updates without the worker after which a camera is trusted when the worker reappears.
 """
 _TRUSTED_UPDATES = 5
 """Number of updates for which a camera is trusted after the worker has reappeared."""
 _ENOUGH = 3
-"""Number of cameras with swapped labels from which the tracked body itself may be mirrored."""
+"""Number of seemingly swapped cameras from which the tracked body itself may be mirrored."""
 _AGAINST = 5.0
 """Upper bound of the other cameras' log-likelihood ratio against a mirrored body."""
 _LEAST_CHANCE = 1e-3
@@ -88,10 +88,10 @@ class Frame(NamedTuple):
     """
 
     cameras: Records1[Camera]
-    """(C,) cameras as calibrated."""
+    """(C,) calibrated cameras."""
     P: Floats
-    """(C, 3, 4) projections for the assumed poses of the cameras; the third row is the optical
-    axis."""
+    """(C, 3, 4) projections for the assumed poses of the cameras. The third row of each projection
+    contains the optical axis."""
     z: Points2
     """(J, C, 2) pixels; 0 where there is no measurement."""
     sigma: Floats
@@ -116,7 +116,8 @@ class JointPixel(NamedTuple):
     v: float
     """Row [px]."""
     depth: float
-    """Depth along the optical axis [m]; the pixel is invalid if it is at most `NEAREST_DEPTH_M`."""
+    """Depth along the optical axis [m]. The pixel is valid only if the depth exceeds
+    `NEAREST_DEPTH_M`."""
     spread: float
     """Variance of the pixel, averaged over both coordinates [px^2]."""
 
@@ -126,9 +127,9 @@ def is_measurement(u: float, v: float, confidence: float, sigma: float) -> bool:
     """Return whether a detection is valid as a measurement.
 
     Args:
-        u: column of its pixel [px].
-        v: row of its pixel [px].
-        confidence: its confidence.
+        u: column of the detected pixel [px].
+        v: row of the detected pixel [px].
+        confidence: confidence of the detection.
         sigma: standard deviation of each coordinate [px].
     """
     return (
@@ -216,7 +217,7 @@ def project_joint(p: Floats, mean: Floats, cov: Floats) -> JointPixel:
     Args:
         p: (3, 4) projection of the camera.
         mean: (3+,) position of the joint [m].
-        cov: (3+, 3+) its covariance [m^2].
+        cov: (3+, 3+) covariance of the position [m^2].
     """
     x, y, z = mean[0], mean[1], mean[2]
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
@@ -237,7 +238,7 @@ def is_consistent(
         sigma: standard deviation of each coordinate [px].
         gate_sigma: the gate, in standard deviations.
         mean: (3+,) position of the joint [m].
-        cov: (3+, 3+) its covariance [m^2].
+        cov: (3+, 3+) covariance of the position [m^2].
     """
     u, v, depth, spread = project_joint(camera, mean, cov)
     if not depth > NEAREST_DEPTH_M:
@@ -273,7 +274,7 @@ def read_for_hypothesis(
         frame: measurements of the worker, filled in.
 
     Returns:
-        Whether the tracked body has left and right swapped, and not the cameras.
+        Whether left and right are swapped in the tracked body rather than by the cameras.
     """
     read_worker(measured, b, w, settings.sigma_scale, frame)
     scale_sigma(noise, frame.sigma)
@@ -282,7 +283,7 @@ def read_for_hypothesis(
 
 @kernel
 def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
-    """Multiply standard deviations (J, C) by the roots of the learnt variance factors, in place."""
+    """Multiply standard deviations (J, C) by the square roots of the learnt factors, in place."""
     for j in range(len(sigma)):
         for c in range(sigma.shape[1]):
             sigma[j, c] *= math.sqrt(noise[j, c].factor)
@@ -299,8 +300,8 @@ def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settin
         settings: settings of the estimator.
 
     Returns:
-        Whether the tracked body has left and right swapped instead. This is assumed if several
-        cameras seem to be swapped and the other cameras do not contradict.
+        Whether left and right are swapped in the tracked body instead. This is assumed if several
+        cameras seem to be swapped and the other cameras do not contradict it.
     """
     n_seeing, n_swapped, against = 0, 0, 0.0
     for c in range(len(views)):

@@ -1,8 +1,8 @@
 """Estimates without cameras: the ground truth and the prior.
 
-This is the only module that turns ground truth into an estimate (perception level `truth`, for
-teaching and for upper bounds). The prior is the estimate at the level `none`, and that of every
-estimator before the first detection.
+This is the only module that converts ground truth into an estimate (perception level `truth`, which
+serves for teaching and for upper bounds on performance). The prior is the estimate at the level
+`none`, and that of every estimator before the first detection.
 """
 
 from dataclasses import replace
@@ -30,7 +30,7 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
 
 
 def estimate_absence(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
-    """Return the estimate for environments that are known to be without people.
+    """Return the estimate for environments that are known to contain no people.
 
     Args:
         batch: number of environments B.

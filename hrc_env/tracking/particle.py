@@ -31,23 +31,23 @@ from hrc_env.tracking.tree.state import Hypotheses, Tree, Work, make_hypotheses,
 
 @dataclass(frozen=True, slots=True)
 class ParticleEstimator:
-    """Rao-Blackwellised particle filter; see `tracking.estimators.Estimator`."""
+    """Estimator by Rao-Blackwellised particle filtering; see `tracking.estimators.Estimator`."""
 
     P: Floats
     """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
-    """Usual time between two updates [s]."""
+    """Nominal time between two updates [s]."""
     config: ParticleConfig
     """Settings of the estimator."""
     cameras: Records1[Camera] = field(init=False, repr=False)
     """(C,) cameras of the projections `P`."""
     settings: Settings = field(init=False, repr=False)
-    """Settings as a named tuple, for compiled functions."""
+    """Settings as a named tuple, which compiled functions accept."""
     noise_model: NoiseModel = field(init=False, repr=False)
     """Constants for learning the measurement noise."""
 
     def __post_init__(self) -> None:
-        """Derive the arguments of compiled functions."""
+        """Compute the fields that compiled functions take as arguments."""
         object.__setattr__(self, "cameras", cameras_of(self.P))
         object.__setattr__(self, "settings", make_settings(self.config))
         object.__setattr__(self, "noise_model", make_noise_model(self.config, self.ctrl_dt))

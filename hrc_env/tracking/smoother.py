@@ -1,4 +1,4 @@
-"""Offline smoothing of a whole clip, as an upper bound for estimators.
+"""Offline smoothing of a whole clip, as an upper bound on the accuracy of estimators.
 
 The filter on the kinematic tree runs through the clip with one hypothesis. A Rauch-Tung-Striebel
 pass (AIAA Journal 3, 1965) then runs backwards with the linear motion model, on all 90 coordinates

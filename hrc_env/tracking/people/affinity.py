@@ -1,9 +1,9 @@
 """Affinity between a 2D pose in one camera and a body with predicted joints.
 
 Each joint contributes the log-likelihood ratio of a detection near its predicted pixel against one
-anywhere in the image; the penalty of a gross error is limited by the gate. The errors of a body's
-joints are correlated; therefore the affinity is the mean over joints, not the sum. A detector may
-swap left and right; therefore the affinity is the larger of those with and without a swap.
+anywhere in the image; the gate limits the penalty of a gross error. The errors of a body's joints
+are correlated; therefore the affinity is the mean over joints, not the sum. A detector may swap
+left and right; therefore the affinity is the larger of those with and without a swap.
 """
 
 import math
@@ -48,7 +48,7 @@ class AssociationSettings(NamedTuple):
     """The fields of `AssociationConfig` as a named tuple, for compiled functions."""
 
     gate_sigma: float
-    """Gate of a joint around its predicted pixel, in standard deviations."""
+    """Gate around the predicted pixel of a joint, in standard deviations."""
     prediction_std_m: float
     """Standard deviation of errors that predictions do not account for [m]."""
     min_joints: int
@@ -76,7 +76,7 @@ def project_body(
         camera: (3, 4) projection.
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        known: (J,) whether the joint's position is known.
+        known: (J,) whether the position of the joint is known.
         prediction_std_m: standard deviation of errors that `cov` does not include [m].
         image: (J, 3) u, v [px] and their mean variance [px^2], filled in. The variance is -1 for
             joints that are unknown or not in front of the camera.

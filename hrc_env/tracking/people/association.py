@@ -62,8 +62,8 @@ class AssociationConfig:
     """Current names of renamed fields, by their former names."""
 
     gate_sigma: float = 5.0
-    """Gate of a joint around its predicted pixel, in standard deviations. At least half of a pose's
-    joints must be within it."""
+    """Gate around the predicted pixel of a joint, in standard deviations. At least half of a pose's
+    joints must be within their gates."""
     prediction_std_m: float = 0.05
     """Standard deviation of errors that predictions do not account for [m], such as persistent
     errors of the detector and sudden movements."""
@@ -101,7 +101,7 @@ def associate(
 
     Args:
         P: (C, 3, 4) projections from the world [m] to pixels.
-        detected: (B, C, D, J, ...) D poses per camera in any order; missing ones are NaN.
+        detected: (B, C, D, J, ...) D poses per camera in any order; missing poses are NaN.
         predicted: (B, W, ...) prediction of the workers for the time of these frames.
         config: settings of the assignment; None for the defaults.
 
@@ -193,7 +193,7 @@ def _assign_to_tracked(
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) poses in each camera; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
         cov: (W, J, 3, 3) covariances of the joints [m^2].
         tracked: (W,) whether the worker is tracked.
@@ -230,11 +230,11 @@ def _assign_new_people(
     settings: AssociationSettings,
     chosen: Ints,
 ) -> None:
-    """Assign the poses of each body that several cameras see to the worker that it belongs to.
+    """Assign the poses of each body that several cameras see to a worker.
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) poses in each camera; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
         tracked: (W,) whether the worker is tracked.
         settings: settings of the assignment.

@@ -27,9 +27,9 @@ _LEAST_VARIANCE = 1e-4
 WIDEST_STD_M = 0.5
 """Standard deviation above which a triangulated joint is not used [m]."""
 _GUESS_STD_M = 0.3
-"""Standard deviation of a joint guessed from a body of known heading [m]."""
+"""Standard deviation of the position of a joint guessed from a body of known heading [m]."""
 _GUESS_STD_WITHOUT_HEADING_M = 0.6
-"""Standard deviation of a joint guessed from a body of unknown heading [m]."""
+"""Standard deviation of the position of a joint guessed from a body of unknown heading [m]."""
 _MIRROR = tuple(int(j) for j in MIRROR)
 _SWAP_COST = 4.0
 """Negative log-probability that a camera swaps left and right labels [nat]."""
@@ -163,7 +163,7 @@ def _triangulate(
 
 @kernel(makes_arrays=True)
 def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) -> int:
-    """Drop joints that are too uncertain or too far from the others; return the number of the rest.
+    """Drop joints that are too uncertain or too far from the others; return how many remain.
 
     Args:
         points: (J, 3) positions [m].
@@ -276,7 +276,8 @@ def agree_on_sides(frame: Frame, settings: Settings) -> None:
 def _find_camp(gain: Floats) -> Bools:
     """Return a mask (C,) of the minority of cameras that label left and right unlike the others.
 
-    `gain` (C, C) is the decrease of the misfit of two cameras [nat] if one of them is mirrored.
+    `gain` (C, C) is the decrease of the misfit of each pair of cameras if one of the two is
+    mirrored [nat].
     """
     other = gain[0] > _SWAP_COST
     for _ in range(len(gain)):
@@ -298,7 +299,7 @@ def _find_camp(gain: Floats) -> Bools:
 
 @kernel(makes_arrays=True)
 def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
-    """Return the decrease [nat] of the misfit of cameras a and b if one of them is mirrored."""
+    """Return the decrease of the misfit of cameras `a` and `b` if one of them is mirrored [nat]."""
     direct, exchanged = _measure_misfit(frame, a, b, False), _measure_misfit(frame, a, b, True)
     is_fitting = min(direct.total, exchanged.total) < _FITS * _MOST * direct.n_joints
     return direct.total - exchanged.total if is_fitting else 0.0
@@ -361,7 +362,7 @@ def _find_joints_again(
         tree: the updated hypothesis, changed in place.
         frame: the measurements.
         settings: settings of the estimator.
-        is_placed: (J,) set to 1 for these joints, in place.
+        is_placed: (J,) flags, set to 1 for the reacquired joints.
     """
     everything, middle = np.ones(len(is_placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
@@ -376,7 +377,7 @@ def _find_joints_again(
 
 @kernel
 def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Reacquire the whole body if enough joints are contradicted; return whether it succeeded."""
+    """Reacquire the whole body if enough joints are contradicted; return whether this succeeds."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= settings.conflict_frames
@@ -390,14 +391,14 @@ def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
 def _repair(tree: Tree, settings: Settings) -> bool:
     """Repair covariances that are not positive definite, and reset an implausible body.
 
-    Such a covariance loses everything but its diagonal. If any joint is not finite, or more than
-    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are put back to
-    the prior, at rest, and the track is lost.
+    Such a covariance is replaced by its diagonal. If any joint is not finite, or more than
+    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are reset to the
+    prior, at rest, and the track is lost.
 
     Args:
         tree: the hypothesis, changed in place: `body` (J, 6) positions [m] and velocities [m/s] in
-            the world frame, `cov` (J, 6, 6) their covariances.
-        settings: mean and standard deviation of the prior position, and greatest age.
+            the world frame, `cov` (J, 6, 6) covariances of both.
+        settings: mean and standard deviation of the prior position, and maximum age.
 
     Returns:
         True if nothing had to be changed.

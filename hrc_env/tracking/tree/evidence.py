@@ -11,8 +11,8 @@ conditional covariance R_j = C_j - B_j C_q B_j' of joint j given its parent q, d
 of all det R_j. Terms that all hypotheses share are omitted.
 
 Bodies have nose, toes and knees in front, but a body that is tracked mirrored in depth has them
-behind. This plausibility of the current pose replaces that of the previous pose in the weight;
-therefore it does not accumulate over frames.
+behind. Therefore the weight also contains the plausibility of the current pose, which replaces that
+of the previous pose and does not accumulate over frames.
 """
 
 import math
@@ -34,16 +34,16 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 class Feature(NamedTuple):
-    """Distribution of a joint's position along the heading, relative to the mean of two others."""
+    """Distribution of a joint's position along the heading, relative to two other joints."""
 
     joint: int
     """Index of the joint."""
     first: int
-    """Index of the first other joint."""
+    """Index of the first of the two other joints."""
     second: int
-    """Index of the second other joint."""
+    """Index of the second of the two other joints."""
     ahead_m: float
-    """Mean distance of the joint in front of the mean of the two others [m]."""
+    """Mean distance by which the joint is in front of the mean position of the two others [m]."""
     std_m: float
     """Standard deviation of that distance [m]."""
 
@@ -124,8 +124,9 @@ def _log_likelihood_of_pixels(body: Floats, frame: Frame, inlier_odds: float) ->
     Args:
         body: (J, 6) positions [m] and velocities [m/s] of the joints in the world frame.
         frame: the measurements: `P` (C, 3, 4) projections, `z` (J, C, 2) pixels, `sigma` (J, C)
-            their standard deviations [px], `ok` (J, C) whether they exist.
-        inlier_odds: odds of an inlier, times the outliers' area in the image, over 2 pi [px^2].
+            their standard deviations [px], `ok` (J, C) whether there is a measurement.
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel variance
+            [px^2].
     """
     projections, pixels, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
@@ -242,7 +243,7 @@ def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
 
 @kernel
 def distance_between(one: Tree, other: Tree, work: Work) -> float:
-    """Return the squared Mahalanobis distance between two trees under the wider of them."""
+    """Return the squared Mahalanobis distance between two trees, the smaller of both directions."""
     least = np.inf
     for tree in (one, other):
         for j in range(len(one.body)):

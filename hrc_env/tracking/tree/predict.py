@@ -31,23 +31,25 @@ from hrc_env.tracking.tree.state import Tree, Work
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # _LEFT is parent of _RIGHT, _LEFT_HIP
 _REORDER = {"reassoc", "contract", "nsz"}
 _UPRIGHT_COSINE = math.cos(math.radians(25.0))
-"""Cosine of the largest angle from the vertical of an upright trunk (an estimate)."""
+"""Cosine of the largest angle from the vertical of an upright trunk. The angle is an estimate."""
 _LYING_COSINE = math.cos(math.radians(50.0))
-"""Cosine of the smallest angle from the vertical of a lying trunk (an estimate)."""
+"""Cosine of the smallest angle from the vertical of a lying trunk. The angle is an estimate."""
 _SHORT_M = 0.05
-"""Minimum length of the right-to-left vector for a heading [m]."""
+"""Minimum length of the right-to-left vector from which a heading is computed [m]."""
 _KNEE, _FOOT = JOINT["left_knee"], JOINT["left_foot"]
 SPREAD_M: Floats = np.array(
     [0.06, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.22, 0.22]
 )
-"""(J,) standard deviation of a joint about its mean position on the body [m] (an estimate)."""
+"""(J,) standard deviation of a joint about its mean position on the body [m]. The values are
+estimates."""
 SPEED_M_S: Floats = np.array(
     [0.2, 0.2, 0.2, 0.5, 0.5, 0.95, 0.95, 0.2, 0.2, 0.5, 0.5, 0.9, 0.9, 0.95, 0.95]
 )
-"""(J,) standard deviation of a joint's speed relative to the body [m/s]. The values are an estimate
-for people at work; with doubled values, predicted standard deviations would be twice the errors."""
+"""(J,) standard deviation of a joint's speed relative to the body [m/s]. The values are estimates
+for people at work. With doubled values, the predicted standard deviations would be twice the
+errors."""
 _OFFSET_TAU_S = 2.0
-"""Time constant with which mean positions on the body are forgotten [s]."""
+"""Time constant of the averages of joints' positions on the body [s]."""
 _OFFSET_STD_M = 0.06
 """Standard deviation of a joint's position above which its offset is not learnt [m]."""
 
@@ -78,24 +80,24 @@ class TorsoState(NamedTuple):
     """Mean position and velocity of the four torso joints in the world frame."""
 
     x: float
-    """First coordinate [m]."""
+    """Coordinate x [m]."""
     y: float
-    """Second coordinate [m]."""
+    """Coordinate y [m]."""
     z: float
-    """Height [m]."""
+    """Coordinate z, the height [m]."""
     vx: float
-    """Velocity along the first axis [m/s]."""
+    """Velocity along x [m/s]."""
     vy: float
-    """Velocity along the second axis [m/s]."""
+    """Velocity along y [m/s]."""
     vz: float
-    """Upward velocity [m/s]."""
+    """Velocity along z, upwards [m/s]."""
 
 
 class Lean(NamedTuple):
-    """The attitude of a trunk."""
+    """Degree and direction of a trunk's lean."""
 
     share: float
-    """Degree of lying, from 0 for an upright trunk to 1 for a lying one."""
+    """Degree of the lean, from 0 for an upright trunk to 1 for a lying trunk."""
     direction: Vector3
     """Unit vector from the hips to the shoulders in the world frame."""
 
