@@ -55,7 +55,7 @@ CAUCHY = 0.7
 """Number of standard deviations at which a residual has half its weight. These Cauchy weights bound
 the evidence of a single view."""
 LEAST_VIEWS = 3
-"""Minimum number of cameras that must see a joint."""
+"""Minimum number of cameras that must see a joint for it to be used."""
 LEAST_DEPTH_M = 0.3
 """Minimum depth of a joint in a camera at which the camera's detection is used [m]."""
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
@@ -67,9 +67,10 @@ JACOBIAN = 5
 PLACE = 11
 """First of two columns with the expected pixel [px]."""
 N_VIEW = 13
-"""Number of columns of a view."""
+"""Number of columns of a view of a joint."""
 EVERY = 10
-"""Number of updates between two samples; errors of the detector persist for about 12 updates."""
+"""Number of updates between two samples. It is similar to the number of updates, about 12, for
+which errors of the detector persist."""
 PRIOR = (0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2)
 """Prior precision of each parameter."""
 ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
@@ -77,7 +78,7 @@ ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
 
 
 class MonitoredCamera:
-    """The evidence for an error in the calibration of one camera of one environment."""
+    """Evidence for an error in the calibration of one camera of one environment."""
 
     updates: int
     """Number of updates since the reset."""
@@ -237,7 +238,7 @@ def _add_joint(
 
     Args:
         view: (C, N_VIEW) views of the joint.
-        sees: (C,) whether the view is used.
+        sees: (C,) mask of the views that are used.
         axes: (C, 3) principal point and focal length [px].
         cameras: (C,) evidence, increased in place.
         scratch: (N_PARAMETERS, N_PARAMETERS) work array.

@@ -46,7 +46,7 @@ class TrackerConfig:
     acquire_min_joints: int = 6
     """Number of joints on which two cameras must agree to start a track."""
     body_radius_m: float = 1.3
-    """Largest distance of a joint from the centre of the body [m]. Joints beyond it are
+    """Maximum distance of a joint from the centre of the body [m]. More distant joints are
     rejected."""
     conflict_frames: int = 3
     """Number of successive updates in which two views must agree on another position of a joint
@@ -135,7 +135,7 @@ class ParticleConfig(TrackerConfig):
     outlier_weight: float = 0.15
     """Prior probability that a measurement is an outlier. Outliers are uniform over the image."""
     image_area_px: float = 1920.0 * 1080.0
-    """Area of an image [px^2]; its inverse is the probability density of an outlier."""
+    """Area of an image [px^2]. Its inverse is the probability density of an outlier's pixel."""
     damping: float = 0.5
     """Damping ratio of the motion of a joint relative to the body, in (0, 1)."""
     mean_correction: float = 0.8
@@ -145,8 +145,8 @@ class ParticleConfig(TrackerConfig):
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of a worker seen by only one camera for several updates."""
     lying_inflation: float = 4.5
-    """Additional factor on the reported covariance of a lying body seen by only one camera, because
-    the depth inferred from one view relies on an upright posture."""
+    """Additional factor on the reported covariance of a lying body seen by only one camera. It is
+    needed because the depth inferred from one view relies on an upright posture."""
     n_hypotheses: int = 8
     """Maximum number of hypotheses about one worker. With 1, the state of a worker is a single
     Gaussian, as in `estimator="kalman"`."""
@@ -174,10 +174,10 @@ class ParticleConfig(TrackerConfig):
     rotation equals this angle, the initial weight of the new hypothesis is e^-0.5 times that of the
     existing one."""
     evidence_exponent: float = 0.1
-    """Exponent on the evidence of a set of frames when hypotheses are weighted, because model
-    errors are correlated from frame to frame."""
+    """Exponent applied to the evidence of a set of frames when hypotheses are weighted. It is below
+    1 because model errors are correlated from frame to frame."""
     anatomy_exponent: float = 1.0
-    """Exponent on the anatomical prior when hypotheses are weighted. The prior concerns the
+    """Exponent applied to the anatomical prior when hypotheses are weighted. The prior concerns the
     positions of nose, toes, knees and elbows relative to the body."""
     walking_log_odds_per_s: float = 2.0
     """Rate at which the log-odds of a hypothesis with a body walking forwards increase relative to
@@ -249,8 +249,8 @@ class PaperConfig(TrackerConfig):
     """Current names of renamed fields, by their former names."""
 
     velocity_tau_s: float = 0.2
-    """Time constant of the low-pass filter for velocities, which are differences of positions
-    [s]."""
+    """Time constant of the low-pass filter for velocities, which are computed from differences of
+    positions [s]."""
     n_particles: int = 1000
     """Number of particles per joint, the paper's M."""
     sigma_m: float = 0.05
@@ -291,8 +291,8 @@ class TriangulationConfig(TrackerConfig):
     """
 
     velocity_tau_s: float = 0.2
-    """Time constant of the low-pass filter for velocities, which are differences of positions
-    [s]."""
+    """Time constant of the low-pass filter for velocities, which are computed from differences of
+    positions [s]."""
     hold_speed_m_s: float = 1.0
     """Growth rate of a joint's standard deviation while no frame shows the joint [m/s]."""
 

@@ -2,11 +2,11 @@
 
 A camera contradicts a track if most of its confident detections are farther from the track's joints
 than the detector's errors can explain. A single camera may do so briefly after it has swapped left
-and right labels, or while a track restarts. If several cameras do so persistently, they are not
-where their calibration says: they were moved, interchanged or mirrored.
+and right labels, or while a track restarts. If several cameras do so persistently, their
+poses differ from the calibration: they were moved, interchanged or mirrored.
 
 A track with a body that is far too small or too large explains no detection. If the calibration
-used other units, or a board of another size, all cameras agree on such a body.
+used wrong units or a board of the wrong size, all cameras agree on such a body.
 """
 
 import math
@@ -44,9 +44,9 @@ class DetectedPoses(NamedTuple):
     """Masks of the cameras that detect poses, and of those that detect unexplained poses."""
 
     poses: Bools
-    """(B, C) whether the camera detects a pose."""
+    """(B, C) mask of the cameras that detect a pose."""
     unexplained: Bools
-    """(B, C) whether the camera detects a pose that no track explains."""
+    """(B, C) mask of the cameras that detect a pose that no track explains."""
 
 
 def find_unexplained(

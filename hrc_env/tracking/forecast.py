@@ -26,13 +26,13 @@ from hrc_env.tracking.tree.evidence import Heading, find_heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
-"""Longest horizon of a forecast [s]."""
+"""Maximum horizon of a forecast [s]."""
 N_INPUTS = 7 * N_JOINTS + 4
 """Number of the network's inputs; see `describe`."""
 _N_OUTPUTS = 4 * N_JOINTS
 """Number of the network's outputs for one horizon: displacements and log standard deviations."""
 _TORSO = (1, 2, 7, 8)
-"""Indices of shoulders and hips."""
+"""Indices of the joints of the torso: shoulders and hips."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
@@ -64,11 +64,11 @@ class Scratch(NamedTuple):
     """Activations of the network for one body."""
 
     inputs: Tensor
-    """(N_INPUTS,) inputs."""
+    """(N_INPUTS,) inputs of the network."""
     first: Tensor
-    """(n,) first hidden layer."""
+    """(n,) activations of the first hidden layer."""
     second: Tensor
-    """(m,) second hidden layer."""
+    """(m,) activations of the second hidden layer."""
     before: Tensor
     """(60,) outputs for the last trained horizon that is shorter than the requested one."""
     after: Tensor
@@ -79,9 +79,9 @@ class Motion(NamedTuple):
     """The predicted motion of one body in the frame of its heading."""
 
     moved: Points3
-    """(J, 3) displacements [m]."""
+    """(J, 3) displacements of the joints [m]."""
     rate: Velocities3
-    """(J, 3) velocities [m/s]."""
+    """(J, 3) velocities of the joints at the end of the motion [m/s]."""
     std: Floats
     """(J,) standard deviations of the displacements [m]."""
 

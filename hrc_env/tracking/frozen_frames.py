@@ -20,7 +20,7 @@ LEAST_NEW = 3
 
 
 class LastImage:
-    """Record of the last images of one camera in one environment."""
+    """Checksum of the last image of one camera in one environment, and number of new images."""
 
     total: float
     """Checksum of the keypoints in the last image that had keypoints; 0 before the first one."""

@@ -28,13 +28,13 @@ from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW, Noise, Tree, View
 
 MIN_SIGMA_PX = 0.25
-"""Smallest standard deviation of a detection that is used [px]."""
+"""Lower bound of the standard deviations of detections [px]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 _MIRROR = tuple(int(j) for j in MIRROR)
 """Index of each joint's counterpart on the other side of the body."""
 _UNSEEN_UPDATES = 8
-"""Number of updates without the worker after which a camera is trusted when the worker reappears.
-"""
+"""Number of updates without a detection after which a camera that sees the worker again is
+trusted."""
 _TRUSTED_UPDATES = 5
 """Number of updates for which a camera is trusted after the worker has reappeared."""
 _ENOUGH = 3
@@ -51,9 +51,9 @@ class KeypointArrays(NamedTuple):
     """The arrays of `Keypoints` that estimators read, as a tuple for compiled functions."""
 
     px: Points2
-    """(B, C, W, J, 2) pixels."""
+    """(B, C, W, J, 2) pixels of the keypoints."""
     confidence: Floats
-    """(B, C, W, J) confidence, 0 to 1."""
+    """(B, C, W, J) confidence of each keypoint, 0 to 1."""
     sigma_px: Floats
     """(B, C, W, J) standard deviation of each coordinate [px]."""
 
@@ -93,11 +93,11 @@ class Frame(NamedTuple):
     """(C, 3, 4) projections for the assumed poses of the cameras. The third row of each projection
     contains the optical axis."""
     z: Points2
-    """(J, C, 2) pixels; 0 where there is no measurement."""
+    """(J, C, 2) measured pixels; 0 where there is no measurement."""
     sigma: Floats
     """(J, C) standard deviations of the pixels [px]; 1 where there is no measurement."""
     ok: Bools
-    """(J, C) whether there is a measurement."""
+    """(J, C) mask of the existing measurements."""
     belief: Floats
     """(J, C) probability that the measurement is an inlier."""
     views: Floats
@@ -112,9 +112,9 @@ class JointPixel(NamedTuple):
     """The predicted pixel of a joint in one camera."""
 
     u: float
-    """Column [px]."""
+    """Column of the pixel [px]."""
     v: float
-    """Row [px]."""
+    """Row of the pixel [px]."""
     depth: float
     """Depth along the optical axis [m]. The pixel is valid only if the depth exceeds
     `NEAREST_DEPTH_M`."""
@@ -394,7 +394,7 @@ def mirror(c: int, z: Points2, sigma: Floats, ok: Bools) -> None:
         c: index of the camera.
         z: (J, C, 2) pixels.
         sigma: (J, C) standard deviations [px].
-        ok: (J, C) whether there is a measurement.
+        ok: (J, C) mask of the existing measurements.
     """
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]

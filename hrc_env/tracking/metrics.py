@@ -90,7 +90,7 @@ def measure_errors(
     Args:
         estimate: (B, W, ...) tracks.
         joints_world: (B, W, J, 3) true joints [m].
-        present: (B, W) whether the worker is present.
+        present: (B, W) mask of the workers that are present.
         identities: matches since the episodes began, changed in place.
 
     Returns:
@@ -146,7 +146,7 @@ def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> 
 
     Args:
         off_m: (W, W) distance of each worker from each track [m].
-        tracked: (W,) whether the slot has a track.
+        tracked: (W,) mask of the slots with a track.
         cost: (W, W) work array.
         chosen: (W,) work array.
     """

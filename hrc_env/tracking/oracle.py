@@ -14,11 +14,12 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.tracks import copy_estimate, make_tracks
 
 ORACLE_STD_M = 1e-3
-"""Standard deviation reported with the truth [m]: small, but with invertible covariances."""
+"""Standard deviation reported with the truth [m]. It is small, but the covariances remain
+invertible."""
 
 
 def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
-    """Return the truth as an estimate (B, W, J, ...) in which all workers are tracked at age 0."""
+    """Return the truth as an estimate (B, W, J, ...) with all workers tracked and all ages 0."""
     shape = truth.joints_world.shape[:-1]
     return PoseEstimate(
         mean_world=truth.joints_world.copy(),

@@ -171,7 +171,7 @@ class OutOfSequence(Generic[State]):
         Args:
             state: changed in place.
             keypoints: (B, C, W, J) keypoints.
-            use: (B, C) whether the frame is used.
+            use: (B, C) mask of the frames to use.
             rngs: one generator for each environment of the batch.
         """
         if use.all():

@@ -49,7 +49,7 @@ BEHIND = -1e12
 """Log-likelihood of a particle behind a camera that detected the joint. The value practically
 excludes the particle."""
 HEIGHTS_M = (0.0, 2.2)
-"""Bounds of z of the initial particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
+"""Bounds of z for the initial particles if `PaperConfig.initial_bounds_m` is empty [m]."""
 _NARROWEST_M = 1.0
 """Minimum extent of the camera positions along an axis on which they bound the initial particles
 [m]."""
@@ -132,7 +132,7 @@ class PaperEstimator:
 
         Args:
             state: changed in place.
-            moving: (B, W) whether the worker's particles are moved.
+            moving: (B, W) mask of the workers with particles to move.
             dt_s: time that passes [s].
             rngs: (B,) one generator for each environment.
         """

@@ -58,8 +58,8 @@ FORGOTTEN = 3.0
 """Time without a measurement after which the position of a lost worker is forgotten, as a multiple
 of `lost_relaxation_s`."""
 REPEATED = 2
-"""Number of successive images that must show an unexplained person, because the detector
-occasionally mistakes the robot for a person."""
+"""Number of successive images that must show an unexplained person. One image is not enough because
+the detector occasionally mistakes the robot for a person."""
 CONTRADICTED = 6
 """Number of successive images with an unexplained person, in several cameras, that contradict the
 calibration."""
@@ -77,7 +77,8 @@ class Slot:
     unobserved_s: float
     """Time since the cameras last saw the worker, or last found the floor empty [s]."""
     seen_world: Annotated[Points3, (N_JOINTS, 3)]
-    """Estimated joints when a camera last saw the worker [m]; NaN if no camera has."""
+    """Estimated positions of the joints when a camera last saw the worker [m]; NaN if no camera has
+    seen the worker."""
 
 
 SLOT = dtype_of(Slot)
@@ -89,7 +90,7 @@ class SearchCount:
     empty: int
     """Number of successive searches that found no person for the slot."""
     since_s: float
-    """Age of the image of the last of these searches [s]."""
+    """Age of the image in the last of these searches [s]."""
 
 
 SEARCH_COUNT = dtype_of(SearchCount)
@@ -107,26 +108,26 @@ class PresenceArrays(NamedTuple):
     age_s: Floats
     """(B, W) age of the oldest search on which the levels are based [s]."""
     cameras: Bools
-    """(G, C) whether the camera sees the group of patches; not changed."""
+    """(G, C) mask of the cameras that see each group of patches; not changed."""
 
 
 class Evidence(NamedTuple):
     """The tracks and the searches in one update of `b` environments."""
 
     tracked: Bools
-    """(b, W) whether the worker is tracked."""
+    """(b, W) mask of the tracked workers."""
     age_s: Floats
-    """(b, W) age of the worker's youngest joint [s]."""
+    """(b, W) smallest age of the worker's joints [s]."""
     mean_world: Points3
-    """(b, W, J, 3) estimated joints [m]."""
+    """(b, W, J, 3) estimated positions of the joints [m]."""
     found: Floats
     """(b, C, W, J) confidence of the detections before association with workers."""
     assigned: Floats
     """(b, C, W, J) confidence of the detections after association."""
     has_strangers: Bools
-    """(b,) whether there may be a person without a slot."""
+    """(b,) mask of the environments in which there may be a person without a slot."""
     searched: Bools
-    """(b, C) whether the camera searched its whole image."""
+    """(b, C) mask of the cameras that searched their whole image."""
     image_age_s: Floats
     """(b, C) age of the camera's image [s]."""
     enough: int
@@ -143,11 +144,11 @@ class PresenceReport(NamedTuple):
     """The fields of a `PoseEstimate` that an update of presence fills in."""
 
     unknown: Bools
-    """(b, W) whether the slot may have a person without a track."""
+    """(b, W) mask of the slots that may have a person without a track."""
     unobserved_s: Floats
     """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
     seen_world: Points3
-    """(b, W, J, 3) estimated joints when a camera last saw the worker [m]."""
+    """(b, W, J, 3) estimated positions of the joints when a camera last saw the worker [m]."""
 
 
 class FloorState(NamedTuple):
@@ -164,7 +165,7 @@ class ImageSearches:
     """The searches of whole images in one update of B environments."""
 
     whole: Bools
-    """(B, C) whether a camera searched its whole image."""
+    """(B, C) mask of the cameras that searched their whole image."""
     age_s: Floats
     """(B, C) age of the camera's image [s]."""
     enough: int
@@ -361,7 +362,7 @@ def _judge_floor(
         slot: the slot.
         search: (C,) searches for the slot.
         level: (G,) state of each group of patches of floor, changed in place.
-        cameras: (G, C) whether the camera sees the group.
+        cameras: (G, C) mask of the cameras that see each group.
         shown: whether a camera shows a person for the slot.
         evidence: the tracks and the searches of the update.
 
@@ -391,7 +392,7 @@ def _judge_group(
 
     Args:
         search: (C,) searches for the slot.
-        sees: (C,) whether the camera sees the group.
+        sees: (C,) mask of the cameras that see the group.
         level: current state of the group.
         enough: number of searches by all cameras that prove absence.
         shown: whether a camera shows a person for the slot.

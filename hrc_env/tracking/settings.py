@@ -17,7 +17,7 @@ class Settings(NamedTuple):
     gate_sigma: float
     """Maximum residual at which views agree, in standard deviations of the detector."""
     body_radius_m: float
-    """Largest distance of a joint from the centre of the body [m]."""
+    """Maximum distance of a joint from the centre of the body [m]."""
     acquire_min_joints: int
     """Number of joints on which two cameras must agree to start a track."""
     conflict_frames: int
@@ -65,15 +65,15 @@ class Settings(NamedTuple):
     mirrors_limbs: bool
     """Whether hypotheses may mirror a limb in depth."""
     hypothesis_search_period_s: float
-    """Time between two searches for alternative hypotheses, less a tolerance [s]."""
+    """Time between two searches for alternative hypotheses, minus a tolerance [s]."""
     min_ambiguous_depth_std_m: float
     """Smallest standard deviation of a part's depth at which hypotheses are searched for [m]."""
     turn_std_rad: float
     """Standard deviation of the rotation between a new hypothesis and an existing one [rad]."""
     evidence_exponent: float
-    """Exponent on the evidence of a set of frames when hypotheses are weighted."""
+    """Exponent applied to the evidence of a set of frames when hypotheses are weighted."""
     anatomy_exponent: float
-    """Exponent on the anatomical prior when hypotheses are weighted."""
+    """Exponent applied to the anatomical prior when hypotheses are weighted."""
     walking_log_odds_per_s: float
     """Rate at which the log-odds of a hypothesis increase while its body walks forwards [1/s]."""
     log_min_weight: float

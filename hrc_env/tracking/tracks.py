@@ -14,7 +14,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.settings import Settings, make_settings
 
 _ROUNDING = 1e-6
-"""Tolerance of the smallest eigenvalue, as a fraction of the largest variance."""
+"""Tolerance for the smallest eigenvalue, as a fraction of the largest variance."""
 
 
 class Track:
@@ -49,7 +49,7 @@ class EstimateArrays(NamedTuple):
     age_s: Floats
     """(B, W, J) time since a measurement last supported the joint [s]."""
     tracked: Bools
-    """(B, W) whether the worker is tracked."""
+    """(B, W) mask of the tracked workers."""
 
 
 def get_estimate_arrays(estimate: PoseEstimate) -> EstimateArrays:
@@ -158,7 +158,7 @@ def age_worker(
 
 @kernel
 def count_up(age: Floats, dt: float, max_age: float) -> float:
-    """Increase ages and return the smallest [s].
+    """Increase the ages of joints and return the smallest age [s].
 
     Args:
         age: (J,) ages [s], changed in place.

@@ -147,7 +147,7 @@ def _update_track(
         track: the track.
         points: (J, 3) points [m].
         spread: (J, 3, 3) covariances of the points [m^2].
-        found: (J,) whether the joint has a new point.
+        found: (J,) mask of the joints with a new point.
         velocity_tau: time constant of the filter on velocities [s].
     """
     mean, velocity, age = track.mean_world, track.velocity_world, track.age_s

@@ -68,7 +68,7 @@ class AssociationConfig:
     """Standard deviation of errors that predictions do not account for [m], such as persistent
     errors of the detector and sudden movements."""
     min_joints: int = 8
-    """Number of joints, out of 15, on which two cameras must agree for a new person."""
+    """Number of joints, out of 15, on which two cameras must agree to detect a new person."""
     merge_distance_m: float = 0.35
     """Distance between two bodies below which they are considered one person [m]."""
     rejoin_distance_m: float = 1.0
@@ -196,7 +196,7 @@ def _assign_to_tracked(
         poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
         cov: (W, J, 3, 3) covariances of the joints [m^2].
-        tracked: (W,) whether the worker is tracked.
+        tracked: (W,) mask of the tracked workers.
         settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
@@ -236,7 +236,7 @@ def _assign_new_people(
         cameras: (C,) cameras.
         poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
-        tracked: (W,) whether the worker is tracked.
+        tracked: (W,) mask of the tracked workers.
         settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
@@ -327,9 +327,9 @@ def _find_worker(
     Args:
         body: the body.
         mean: (W, J, 3) joints of the workers [m].
-        tracked: (W,) whether the worker has a track.
-        vacant: (W,) whether the slot has no track.
-        unseen: (W,) whether the worker has a track but no camera sees the worker.
+        tracked: (W,) mask of the tracked workers.
+        vacant: (W,) mask of the slots without a track.
+        unseen: (W,) mask of the tracked workers that no camera sees.
         settings: settings that contain these distances.
     """
     distance = np.empty(len(tracked))
@@ -347,7 +347,7 @@ def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
 
     Args:
         distance: (W,) distances [m].
-        among: (W,) whether the worker may be chosen.
+        among: (W,) mask of the workers that may be chosen.
         limit: distance below which a worker may be chosen [m].
     """
     best = -1

@@ -48,7 +48,7 @@ class Body(NamedTuple):
     points: Points3
     """(J, 3) positions of the joints, where the lines of sight meet [m]."""
     met: Bools
-    """(J,) whether the lines of sight of the joint meet; if not, its position is undefined."""
+    """(J,) mask of the joints at which the lines of sight meet; other positions are undefined."""
 
 
 class Proposals(NamedTuple):

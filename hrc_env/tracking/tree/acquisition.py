@@ -1,4 +1,4 @@
-"""Acquisition of bodies on which views agree: tracks are started, repaired and ended.
+"""Initialization, repair and termination of tracks, based on bodies on which views agree.
 
 The lines of sight of two cameras meet at the limbs only if both cameras label left and right alike.
 This divides the cameras into two groups before a body is known. The sizes of the groups, and the
@@ -36,8 +36,8 @@ _SWAP_COST = 4.0
 _MOST = 5.0
 """Upper bound of the misfit of one joint [nat]."""
 _FITS = 0.4
-"""Mean misfit, relative to its upper bound, above which two cameras are not compared, because one
-of them may be rotated relative to its calibration."""
+"""Mean misfit, relative to its upper bound, above which two cameras are not compared. One of them
+may be rotated relative to its calibration."""
 _FOUND_SPEED_STD_M_S = 1.0
 """Standard deviation of the speed of a joint that has just been acquired [m/s]."""
 _FURTHEST_STD = 8.0
@@ -48,7 +48,7 @@ class Misfit(NamedTuple):
     """Misfit between the lines of sight of two cameras."""
 
     total: float
-    """Negative log-likelihood over the joints [nat]."""
+    """Negative log-likelihood, summed over the joints [nat]."""
     n_joints: int
     """Number of joints that both cameras measured."""
 
@@ -89,7 +89,7 @@ def acquire(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel(makes_arrays=True)
 def _place_joint(body: Floats, cov: Floats, point: Floats, spread: Floats) -> None:
-    """Set a joint to rest at a point.
+    """Set a joint to a position at rest.
 
     Args:
         body: (6,) position and velocity, filled in.
@@ -113,7 +113,7 @@ def find_body(frame: Frame, settings: Settings, points: Floats, cov: Floats, fou
         settings: settings of the estimator.
         points: (J, 3) positions [m], filled in.
         cov: (J, 3, 3) covariances of the positions [m^2], filled in.
-        found: (J,) whether the joint was triangulated, filled in.
+        found: (J,) mask of the triangulated joints, filled in.
 
     Returns:
         Whether enough joints were triangulated for a body.
@@ -168,7 +168,7 @@ def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) ->
     Args:
         points: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        found: (J,) whether the joint is used, changed in place.
+        found: (J,) mask of the joints that are used, changed in place.
         radius_m: largest distance of a joint from the centre of the body [m].
     """
     middle, n_found = np.empty(3), 0
@@ -191,7 +191,7 @@ def find_middle(points: Floats, among: Bools, out: Floats) -> bool:
 
     Args:
         points: (J, 3+) positions [m].
-        among: (J,) whether the point is used.
+        among: (J,) mask of the points that are used.
         out: (3,) median [m], filled in.
     """
     values = np.empty(len(points))
@@ -220,7 +220,7 @@ def complete_body(points: Floats, cov: Floats, found: Bools) -> None:
     Args:
         points: (J, 3) positions [m], filled in for missing joints.
         cov: (J, 3, 3) covariances of the positions [m^2], filled in for missing joints.
-        found: (J,) whether the joint is given.
+        found: (J,) mask of the joints that are not missing.
     """
     heading = find_heading_from(points, found[1] and found[2], found[7] and found[8])
     cos, sin = heading.cos, heading.sin
@@ -307,7 +307,7 @@ def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
 
 @kernel(makes_arrays=True)
 def _measure_misfit(frame: Frame, a: int, b: int, is_mirrored: bool) -> Misfit:
-    """Return the misfit of the joints that have a left and a right side in two cameras.
+    """Return the misfit between two cameras over all joints that occur on both sides of the body.
 
     Args:
         frame: the measurements.

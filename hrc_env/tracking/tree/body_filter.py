@@ -177,7 +177,7 @@ def predict_all(
 def _move_worker(
     worker: WorkerHypotheses, model: MotionModel, dt: float, settings: Settings, work: Work
 ) -> None:
-    """Move a worker's hypotheses; if there are several, joint offsets are not learnt.
+    """Predict a worker's hypotheses; joint offsets are learnt only if there is a single hypothesis.
 
     Args:
         worker: the worker's hypotheses, changed in place.

@@ -1,4 +1,4 @@
-"""Search for alternative bodies that one view can hardly distinguish from the tracked one.
+"""Search for alternative bodies that are hard to distinguish from the tracked one in one view.
 
 In one view, a limb that points towards the camera looks almost like one that points away from it
 (the bas-relief ambiguity). To find the alternative, a limb is reflected: its joints stay on their
@@ -81,7 +81,7 @@ _MOST_SEEN_TWICE = 2
 one."""
 _TORSO = (1, 2, 7, 8)
 _LEAST_TURN_RAD = 0.35
-"""Angle between two headings below which two bodies are the same hypothesis [rad]."""
+"""Angle between the headings of two bodies below which they are the same hypothesis [rad]."""
 
 
 def _mark_joints(joints: list[tuple[int, ...]]) -> Bools:
@@ -107,7 +107,7 @@ def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings) -> int:
-    """Return the only camera that sees a part if the part's depth is ambiguous, or else -1.
+    """Return the only camera that sees a part if the part's depth is ambiguous, otherwise -1.
 
     The depth of a part that one camera sees is not ambiguous if recent measurements by other
     cameras still determine the predicted depth.
@@ -270,7 +270,7 @@ def find_lone_camera(part: int, ok: Bools) -> int:
 
     Args:
         part: index of the part.
-        ok: (J, C) whether the camera measured the joint.
+        ok: (J, C) mask of the joints that each camera measured.
     """
     n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
     for c in range(n_cameras):

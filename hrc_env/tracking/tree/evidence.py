@@ -57,7 +57,7 @@ _FEATURES = (
     Feature(3, 1, 5, -0.05, 0.12),  # the elbows behind the arms
     Feature(4, 2, 6, -0.05, 0.12),
 )
-"""Expected positions of nose, toes, knees and elbows, estimated from common proportions; the
+"""Expected positions of nose, toes, knees and elbows, estimated from typical body proportions. The
 standard deviations allow for turned heads and feet."""
 _MOST = 4.5
 """Upper bound of the penalty of one feature [nat], which corresponds to three standard
@@ -67,7 +67,7 @@ _CLOSE = 2.0
 
 
 class TreeMeasure(NamedTuple):
-    """Size of a change of the body under a Gaussian on the tree, and the Gaussian's determinant."""
+    """Mahalanobis length of a change of the body under a Gaussian on the tree; its determinant."""
 
     squared: float
     """Squared Mahalanobis length of the change."""
@@ -79,9 +79,9 @@ class Heading(NamedTuple):
     """The direction in which a body faces, projected onto the floor."""
 
     cos: float
-    """Cosine of the angle from the world's x axis; 0 if unknown."""
+    """Cosine of the angle from the world's x axis; 0 if the heading is unknown."""
     sin: float
-    """Sine of the angle from the world's x axis; 0 if unknown."""
+    """Sine of the angle from the world's x axis; 0 if the heading is unknown."""
     is_known: bool
     """Whether the left and right joints are far enough apart, seen from above, for a heading."""
 
@@ -212,7 +212,7 @@ def _measure_diagonal(a: Floats, x: Floats) -> TreeMeasure:
 
 @kernel
 def _log_likelihood_of_bones(body: Floats, length: Floats, variance: Floats) -> float:
-    """Return the log-likelihood of the tree's edges, and of the nose's second bone.
+    """Return the log-likelihood of the bones on the tree's edges and of the nose's second bone.
 
     Args:
         body: (J, 6) positions and velocities.
@@ -243,7 +243,7 @@ def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
 
 @kernel
 def distance_between(one: Tree, other: Tree, work: Work) -> float:
-    """Return the squared Mahalanobis distance between two trees, the smaller of both directions."""
+    """Return the squared Mahalanobis distance between two trees under the wider Gaussian."""
     least = np.inf
     for tree in (one, other):
         for j in range(len(one.body)):
@@ -341,7 +341,7 @@ def exchange_slots(worker: WorkerHypotheses, one: int, other: int) -> None:
 
 @kernel(makes_arrays=True)
 def drop_hypothesis(worker: WorkerHypotheses, h: int) -> None:
-    """Drop hypothesis `h` of several about a worker; the last one takes its slot."""
+    """Drop hypothesis `h` about a worker and move the last hypothesis to its slot."""
     last = worker.n_alive[0] - 1
     if h != last:
         copy_slot(worker, last, h)

@@ -23,7 +23,7 @@ ORDER = (1, 0, 2, 7, 8, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14)
 LEAVES_FIRST = ORDER[::-1]
 """Indices of the joints in an order in which children precede their parents."""
 ROOT = ORDER[0]
-"""The joint without a parent, the left shoulder."""
+"""Index of the joint without a parent, the left shoulder."""
 _ends = [tuple(sorted(int(end) for end in ends)) for ends in BONES]
 EDGE_BONE = tuple(
     _ends.index((min(j, PARENT[j]), max(j, PARENT[j]))) if j != ROOT else -1

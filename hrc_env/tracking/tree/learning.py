@@ -56,7 +56,7 @@ _CHANCE = 0.07
 """Twice the standard deviation of the estimated fraction of persistent variance if no error
 persists."""
 _CORRELATED_UPDATES = 10.0
-"""Number of updates for which errors of a bone's length persist."""
+"""Number of updates for which the errors of a measured bone length persist."""
 _GATE_SIGMA = 3.0
 """Number of standard deviations beyond which a measurement of a bone's length is ignored."""
 _LEAST_VARIANCE = 1e-5
@@ -70,7 +70,7 @@ _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their
 
 
 class NoiseModel(NamedTuple):
-    """Constants for learning the factors on the reported variances."""
+    """Constants for learning the factors applied to the variances that the detector reports."""
 
     keep: float
     """Fraction of a joint's statistics that is retained when the joint is used again."""
@@ -79,9 +79,9 @@ class NoiseModel(NamedTuple):
     share: float
     """Prior fraction L of the variance that persists."""
     min_factor: float
-    """Lower bound of the factors."""
+    """Lower bound of the learnt factors."""
     max_factor: float
-    """Upper bound of the factors; equal to the lower bound if nothing is learnt."""
+    """Upper bound of the learnt factors; equal to the lower bound if nothing is learnt."""
 
 
 def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:

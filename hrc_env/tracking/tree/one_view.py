@@ -125,7 +125,7 @@ def _stand_body(tree: Tree, frame: Frame, camera: int, angle: float) -> bool:
         angle: heading of the body [rad].
 
     Returns:
-        Whether there is such a position.
+        Whether such a position exists.
     """
     P, cos, sin = frame.P[camera], math.cos(angle), math.sin(angle)
     views, place = np.empty((len(STANDING_M), 3, 4)), np.empty(3)

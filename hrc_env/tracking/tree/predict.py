@@ -279,7 +279,7 @@ def measure_lean(body: Floats) -> Lean:
 
 @kernel
 def choose_axes(j: int) -> int:
-    """Return the index of the axes with which joint `j` moves: 0 for the trunk, 1 for the legs."""
+    """Return the index of the axes for joint `j`: 0 for trunk, head and arms, 1 for the legs."""
     return 1 if j >= _KNEE else 0
 
 
@@ -308,7 +308,7 @@ def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bo
 
 @kernel
 def _complete_axes(body: Floats, axes: Floats) -> bool:
-    """Complete axes (3, 3) from the last column, up; return whether the body's left is known."""
+    """Complete axes (3, 3) given the last column, up; return whether the body's left is known."""
     length = along = across = 0.0
     for i in range(3):
         axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
@@ -374,7 +374,7 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
     sin = np.sin(damped_rad_s * dt_s)
     damped_sin = damping * natural_rad_s / damped_rad_s * sin
 
-    F = np.empty((len(natural_rad_s), 2, 2))  # the order on both axes is displacement, velocity
+    F = np.empty((len(natural_rad_s), 2, 2))  # both axes are ordered displacement, velocity
     F[:, 0, 0] = decay * (cos + damped_sin)
     F[:, 0, 1] = decay * sin / damped_rad_s
     F[:, 1, 0] = -decay * natural_rad_s**2 / damped_rad_s * sin

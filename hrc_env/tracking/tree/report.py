@@ -1,4 +1,4 @@
-"""Moments of the mixture of a worker's hypotheses, with wider covariances for single views.
+"""Moments of the mixture of a worker's hypotheses, with covariances increased for single views.
 
 The motion model describes people who walk and work. With one view, the errors for a person that
 spins, falls or runs exceed the Gaussian's standard deviations, because the depths of joints follow
@@ -39,7 +39,7 @@ _TURN = Excess(2.3, 1.1)
 """Parameters for rotation about the vertical. Like `_TIP` and `_SPEED`, they were fitted to people
 walking, spinning, falling, tumbling and running."""
 _TIP = Excess(0.52, 5.0)
-"""Parameters for tilting of the trunk."""
+"""Parameters for the rate at which the trunk tilts."""
 _SPEED = Excess(1.63, 1.1)
 """Parameters for the speed of the trunk."""
 MOST_MOVING = 10.5
@@ -81,7 +81,7 @@ def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> 
 
 @kernel
 def _mix(trees: Records1[Tree], n: int, mean: Floats, cov: Floats, velocity: Floats) -> None:
-    """Compute the moments of a mixture.
+    """Compute the moments of the mixture of a worker's hypotheses.
 
     Args:
         trees: (H,) hypotheses about one worker.

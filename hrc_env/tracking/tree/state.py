@@ -131,7 +131,7 @@ class Tree:
     """Mean position of each joint relative to the centre of the torso, along the body's axes
     forward, left and up [m]."""
     offset_count: Annotated[Floats, (_J,)]
-    """Number of updates from which the joint's offset was learnt."""
+    """Number of updates in which the joint's offset was learnt, plus `STANDING_COUNT`."""
     bone_length: Annotated[Floats, (_J,)]
     """Distance from each joint to its parent [m]."""
     bone_variance: Annotated[Floats, (_J,)]
@@ -176,7 +176,7 @@ class Pace:
     since_s: float
     """Time since the last update [s]."""
     is_known: bool
-    """Whether there has been an update since the track started."""
+    """Whether the pace has been updated since the track started."""
     turn_rad_s: float
     """Exponential moving average of the rate of rotation about the vertical [rad/s]."""
     tip_rad_s: float
@@ -219,7 +219,7 @@ class Work:
     inverse: Annotated[Floats, (_J, 6, 6)]
     """Inverse Hessian of each joint given its parent."""
     step: Annotated[Floats, (_J, 6)]
-    """Change of the means."""
+    """Change of the means in position and velocity."""
     gradient: Annotated[Floats, (_J, 6)]
     """Gradient of the log-likelihood with respect to the means."""
     position_precision: Annotated[Floats, (_J, 3, 3)]
