@@ -87,7 +87,7 @@ class ParticleConfig(TrackerConfig):
     """Settings of the default estimator, a mixture of Gaussian bodies for each worker.
 
     The estimator is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell,
-    UAI 2000). Its mathematics, with the symbols of these settings, is in docs/tracking.md.
+    UAI 2000). Its mathematics is described in docs/tracking.md with reference to these settings.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.

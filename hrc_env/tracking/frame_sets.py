@@ -196,7 +196,7 @@ def has_detections(keypoints: Keypoints) -> Bools:
 def _count_ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
     """Return the ticks (G, C, N) from the beginning of the step to each frame.
 
-    Frames at the end of the step have `_END`, and frames outside of the step have `_NEVER`.
+    The value is `_END` for frames at the end of the step and `_NEVER` for frames outside the step.
 
     Args:
         time_s: (G, C, N) times of the frames [s].

@@ -161,7 +161,8 @@ def make_frame(cameras: Records1[Camera]) -> Frame:
 def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, frame: Frame) -> bool:
     """Fill in the measurements of one worker, and return whether there are any.
 
-    Missing measurements get pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+    For missing measurements, the pixel is set to 0 and sigma to 1 to keep NaN out of the
+    arithmetic.
 
     Args:
         measured: detections of all workers.

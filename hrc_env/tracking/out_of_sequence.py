@@ -72,8 +72,8 @@ class LateState(NamedTuple, Generic[State]):
 class OutOfSequence(Generic[State]):
     """Wrapper that accepts late frames up to `max_delay_s`; see `tracking.estimators.Estimator`.
 
-    It stores a copy of the inner state for every control step within that time, which takes
-    megabytes for the estimator `paper`.
+    The wrapper stores a copy of the inner state for every control step within that time, which
+    requires several megabytes for the estimator `paper`.
     """
 
     inner: Estimator[State]

@@ -361,7 +361,7 @@ def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
 def _measure_distance(body: Body, mean: Points3) -> float:
     """Return the distance between a body and a worker (J, 3) [m]; infinite without common joints.
 
-    It is the distance between the mean positions of the joints that both have.
+    The distance is measured between the mean positions of the joints that both have.
     """
     points, met = body.points, body.met
     n, dx, dy, dz = 0, 0.0, 0.0, 0.0

@@ -205,7 +205,7 @@ def is_positive_definite(a: Floats) -> bool:
 def invert(a: Floats, out: Floats) -> bool:
     """Compute the inverse of a symmetric 6x6 matrix in `out`; return whether it is valid.
 
-    It is valid if the matrix is positive definite.
+    The inverse is valid if the matrix is positive definite.
     """
     blocks = _factor(a)
     p, x, y, z, v = blocks.upper, blocks.x, blocks.y, blocks.z, blocks.lower

@@ -37,10 +37,10 @@ _LEAST_EVIDENCE = 16.0
 """Twice the gain in log-likelihood from the rotations above which cameras are considered
 misaligned. Misaligned cameras remain so above half of this value."""
 _MOST_TURN_RAD = 0.14
-"""Combined rotation from which the lines of sight are assumed to belong to different people
+"""Combined rotation above which the lines of sight are assumed to belong to different people
 [rad]."""
 _MEETING = 3.0
-"""Median squared gap, in variances, below which the lines of sight of a body meet."""
+"""Median squared gap, divided by its variance, below which the lines of sight of a body meet."""
 _FORGETS = 0.1
 """Weight of one update in `Pair.meeting_share`."""
 _LEAST_SHARE = 0.5
@@ -101,8 +101,8 @@ def check_pair_calibration(worker: WorkerHypotheses, frame: Frame, settings: Set
 def _may_start_turned(tree: Tree, cameras: Records1[Camera], settings: Settings) -> bool:
     """Return whether a track may start with two rotated cameras.
 
-    An existing track is kept if the rotations leave the position of the body too uncertain, as
-    those of almost opposite cameras do.
+    An existing track is kept if the rotations leave the position of the body too uncertain, which
+    is the case if the cameras are almost opposite each other.
 
     Args:
         tree: the worker's heaviest hypothesis; its `displaced_m2` is overwritten.

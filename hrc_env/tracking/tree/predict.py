@@ -229,7 +229,7 @@ def _move_covariance(
     """Compute the covariance of joints `j` and `m` after a time step, without noise.
 
     With the transitions f, d of joint j and of its anchor, and g, e of joint m and of its anchor,
-    applied on each axis, it is f cov g' + f own e' + d other' g' + d torso e'.
+    applied on each axis, the covariance is f cov g' + f own e' + d other' g' + d torso e'.
 
     Args:
         own: (6, 6) covariance of joint `j` with the torso's mean.
@@ -391,8 +391,8 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
     """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s].
 
-    It is that of position and velocity on one axis if the acceleration of the whole body is white
-    noise of spectral density `root_acceleration` [m^2/s^3].
+    It is the covariance of position and velocity on one axis if the acceleration of the whole body
+    is white noise with the spectral density `root_acceleration` [m^2/s^3].
     """
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 

@@ -166,7 +166,7 @@ def _linearise_cameras(
 def _add_floor(body: Floats, information: float, work: Work) -> None:
     """Add a measurement of height 0 to joints below the floor.
 
-    It bounds the distance of a body, which is uncertain in one view.
+    The measurement bounds the distance of a body from the camera, which is uncertain in one view.
 
     Args:
         body: (J, 6) predicted means.

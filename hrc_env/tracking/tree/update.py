@@ -414,9 +414,9 @@ def correct_mean(tree: Tree, frame: Frame, settings: Settings, work: Work) -> No
 def count_conflict(n_ok: int, n_supporting: int, conflict: int) -> int:
     """Return the number of successive updates in which views contradict the estimate of a joint.
 
-    It increases if at least two cameras measured the joint and at most one of them supports the
-    estimate. It is reset to 0 if at least two cameras support the estimate or no camera measured
-    the joint, and does not change if a single camera measured the joint.
+    The number increases if at least two cameras measured the joint and at most one of them supports
+    the estimate. It is reset to 0 if at least two cameras support the estimate or no camera
+    measured the joint, and does not change if a single camera measured the joint.
 
     Args:
         n_ok: number of cameras that measured the joint.
