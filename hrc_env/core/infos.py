@@ -6,6 +6,7 @@ finite, another key states whether the number was measured. Names are encoded as
 `name_indices` decodes.
 """
 
+import difflib
 import fnmatch
 import re
 from collections.abc import Mapping, Sequence
@@ -67,11 +68,24 @@ RENAMED = {
 
 
 class InfoDict(dict[str, Any]):
-    """Info of a reset or step, whose `KeyError` for a former key names the current key."""
+    """Info of a reset or step, with errors that name the right key for a former or misspelt one."""
 
     def __missing__(self, key: str) -> Any:
         """Raise a `KeyError` for a missing key."""
-        raise KeyError(_describe_renaming(key) if key in RENAMED else key)
+        if key in RENAMED:
+            raise KeyError(_describe_renaming(key))
+        near = difflib.get_close_matches(str(key), self, 1)
+        raise KeyError(f"{key}; did you mean {near[0]!r}?" if near else key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return the value of a key, or `default` for one that is missing.
+
+        Raises:
+            KeyError: the key is a former one.
+        """
+        if key in RENAMED and key not in self:
+            raise KeyError(_describe_renaming(key))
+        return super().get(key, default)
 
 
 def _describe_renaming(key: str) -> str:

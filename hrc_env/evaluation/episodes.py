@@ -84,6 +84,9 @@ def evaluate(
         trust: whether pickles in a checkpoint may be loaded, as in `make_agent`.
         kwargs: arguments of `HRCVectorEnv`, such as task, perception and estimator.
 
+    Returns:
+        Means and rates over the episodes.
+
     Raises:
         ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
     """
@@ -118,8 +121,10 @@ def evaluate_episodes(
         kwargs: arguments of the environment, as in `evaluate`.
 
     Returns:
-        One dictionary per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
-            `success`, `seconds` and the other `STATISTICS`.
+        One dictionary per episode: the return `r`, the length `l` [control steps] and `seconds`
+            [s]; `cost` and `cost_steps`, its part from steps near a worker [control steps];
+            `contacts`, and of these `contacts_towards`, `contacts_fleeing` and `contacts_standing`;
+            `goals_reached` and `goals_missed`; `success`; and `min_separation_m` [m].
 
     Raises:
         ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.

@@ -30,8 +30,11 @@ RIGS: dict[str, tuple[CameraConfig, ...]] = {
     ),
     "site": SITE_CAMERAS,
 }
-"""Rigs by their names in `cameras=`: the rigs of the scenes, and the lab's rig with the lens of the
-paper."""
+"""Rigs by their names in `cameras=`.
+
+"lab" and "site" are the rigs of the scenes, and "lab_gopro" is that of the laboratory with the lens
+of the paper's camera.
+"""
 POOR_SHARE = 0.1
 """Fraction of the workspace in a camera's view below which its pose counts as poor."""
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)

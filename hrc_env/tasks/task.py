@@ -173,7 +173,7 @@ class Task(Generic[ConfigT, StateT]):
     def draw_start(
         self, rngs: Rngs, place: Any, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """Sample the initial joint positions (n, N) of n robots [rad, or m for slides].
+        """Return sampled initial joint positions (n, N) of n robots [rad, or m for slides].
 
         By default, they are near the home pose.
 
