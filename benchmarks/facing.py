@@ -94,7 +94,7 @@ class Facing:
         return describe_quick_run(max(self.episodes), self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return asdict(self)
 
     def play(self, cache: PartCache) -> dict[str, Metric]:

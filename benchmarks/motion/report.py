@@ -17,7 +17,7 @@ COLUMNS = (
     Column("{}.grip_missed_share", "grips missed", 3),
     Column("{}.inside_itself_share", "in itself", 3),
 )
-"""Columns of the table that lists all scenes."""
+"""Columns of the table of all motions."""
 
 
 def report(metrics: Metrics) -> Report:
@@ -37,7 +37,7 @@ def report(metrics: Metrics) -> Report:
 
 
 def inside(target: Target, metric: Metric) -> bool:
-    """Return whether the median over bodies is in the band of a target."""
+    """Return whether the median over bodies lies within the target band."""
     return target.low <= metric.value <= target.high
 
 

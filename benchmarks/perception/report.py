@@ -50,10 +50,10 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
     """Return the report.
 
     Args:
-        config: settings of the benchmark, which are not used.
-        found: parts of the benchmark, which are not used.
+        config: settings of the benchmark (unused).
+        found: parts of the benchmark (unused).
         metrics: metrics by name.
-        figures: folder of figures, which is not used.
+        figures: folder of figures (unused).
     """
     del config, found, figures
     kinds = {kind: words for kind, (words,) in FAULTS.items()}
