@@ -51,9 +51,9 @@ class Multiplier:
     cost: float = float("nan")
     """Exponential moving average of the cost of an episode; NaN before the first rollout."""
     integral: float = 0.0
-    """Integral term."""
+    """Integral term of the controller."""
     value: float = 0.0
-    """The multiplier lambda."""
+    """Current value of the multiplier lambda."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "limit", "smoothing", "most")

@@ -105,7 +105,7 @@ class ClusterBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on a short run, or "" if it is long enough."""
+        """Warning for the table of a short run, or "" if the run is long enough."""
         is_short = self.n_rounds < ClusterBench().n_rounds
         return f"Quick run, {self.n_rounds} rounds: too few to compare." if is_short else ""
 
@@ -151,11 +151,11 @@ class ClusterBench:
         return found
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return metrics_of(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (TABLE,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:

@@ -75,7 +75,7 @@ class Facing:
     seconds: float = 10.0
     """Duration of an episode [s], including the first second, which is not evaluated."""
     seed: int = 3_000_000
-    """Seed of the first episode."""
+    """Seed of the first episode; it increases by one with each further episode."""
 
     @property
     def seeds(self) -> Sequence[int]:
@@ -89,7 +89,7 @@ class Facing:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         is_short = max(self.episodes) < max(Facing().episodes)
         return describe_quick_run(max(self.episodes), self.seconds) if is_short else ""
 
@@ -114,11 +114,11 @@ class Facing:
         return {name: asdict(m) for name, m in measure_level(level, n, self).items()}
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (TABLE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:

@@ -119,7 +119,7 @@ class Leaf(NamedTuple):
     """A number in a part."""
 
     path: str
-    """Keys that lead to the number, with * for each position in a list."""
+    """Path of the number in the part: its keys, with * for each position in a list."""
     value: float
 
 

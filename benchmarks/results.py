@@ -59,7 +59,7 @@ class Arguments:
     """Run the studies with outdated (stale) results again."""
 
     only: tuple[str, ...] = ()
-    """Studies to run, even if they are up to date (default: all stale ones)."""
+    """Names of studies to run, even if they are up to date (default: all stale ones)."""
     list: bool = False
     """Only print the stale studies, with the reasons and the required times."""
     hours: float | None = None

@@ -53,7 +53,7 @@ class Arguments:
     share: float = 0.02
     """Fraction of all parts to replay; at least one part of each row is replayed."""
     only: tuple[str, ...] = ()
-    """Studies to check (default: all)."""
+    """Names of studies to check (default: all)."""
     seed: int | None = None
     """Seed of the random sample (default: the date as a number)."""
     longest: float = 5.0

@@ -58,11 +58,11 @@ class MotionBench:
         return metrics
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         seconds = [each.value for name, each in metrics.items() if name.endswith(".seconds")]
         lasting = min(seconds), max(seconds)
         short = describe_quick_run(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""

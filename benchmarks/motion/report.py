@@ -21,7 +21,7 @@ COLUMNS = (
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the report."""
+    """Return the report, with its tables and figures."""
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
         "Medians over bodies, with the smallest and the largest value in brackets. The first table "

@@ -102,12 +102,12 @@ class PerceptionBench:
 
     @property
     def n_parts(self) -> int:
-        """Number of parts."""
+        """Number of parts of the benchmark, which are cached separately."""
         return len(list(make_tasks(self)))
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
@@ -129,15 +129,15 @@ class PerceptionBench:
         return played
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played, self.n_faults, self.fault_steps)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         return TABLES
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(self, played, metrics, figures)
 
 

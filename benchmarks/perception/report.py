@@ -47,7 +47,7 @@ emulator's calibration has not seen, by family of motions (`assets.emulator`).""
 
 
 def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
-    """Return the report.
+    """Return the report, with its tables and figures.
 
     Args:
         config: settings of the benchmark (unused).

@@ -91,15 +91,15 @@ class RecordedBench:
         return dict(sorted(metrics.items()))
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (FOOTAGE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics)
 
 

@@ -96,7 +96,7 @@ class SpeedBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
         return (
             describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
@@ -120,7 +120,7 @@ class SpeedBench:
         return measured
 
     def metrics(self, played: Measured) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played)
 
     @property
@@ -129,7 +129,7 @@ class SpeedBench:
         return [(n, k) for n in self.sizes for k in self.threads if k <= n]
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         configurations = (SINGLE, *(f"{size}.{threads}" for size, threads in self.vectors))
         return (make_steps_table(self.levels, configurations), make_organs_table(SHOWN), TASKS)
 

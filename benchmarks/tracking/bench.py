@@ -77,7 +77,7 @@ class TrackingBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         return (
             describe_quick_run(self.n_seeds, find_durations()) if is_as_short(self, QUICK) else ""
         )
@@ -109,15 +109,15 @@ class TrackingBench:
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played, self.selection)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         return (BENCH, times(self.selection.timed()))
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics, self.selection)
 
 

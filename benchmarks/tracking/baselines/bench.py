@@ -71,7 +71,7 @@ class BaselinesBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables of a short run, or "" if it is long enough."""
+        """Warning for the tables of a short run, or "" if the run is long enough."""
         return describe_quick_run(self.n_seeds, find_durations()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
@@ -91,11 +91,11 @@ class BaselinesBench:
         return cells
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics)
 
 
