@@ -1,4 +1,4 @@
-"""Pictures of many environments: of the current step, or of all steps since the last `render`."""
+"""Pictures of many environments, of the current step or of all steps since the last `render`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -17,10 +17,10 @@ LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
 
 
 class LocatedView(NamedTuple):
-    """Views of the shard that contains an environment."""
+    """The views of the shard that contains an environment, and its index in the shard."""
 
     view: Views
-    """Views of that shard."""
+    """Views of the shard."""
     b: int
     """Index of the environment in the shard."""
 
@@ -30,9 +30,9 @@ class Pictures:
 
     Args:
         shards: simulations of the environments.
-        render_mode: form of the pictures; None for none.
+        render_mode: form of the pictures; None if no pictures are rendered.
         size: width and height of the pictures [px].
-        shown: arguments `markers` and `capsules` of `Views.picture`.
+        shown: the arguments `markers` and `capsules` of `Views.picture`, by name.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Pictures:
         return self._draw(k, camera)
 
     def mosaic(self, k: int) -> NDArray[np.uint8]:
-        """Return the cameras' images of environment `k` with crops and skeletons, tiled."""
+        """Return a mosaic of the cameras' images of environment `k` with crops and skeletons."""
         view, b = self._locate(k)
         return view.mosaic(b)
 
@@ -103,6 +103,6 @@ class Pictures:
         return view.picture(is_depth, b, self.size, camera=camera, **self.shown)
 
     def _locate(self, k: int) -> LocatedView:
-        """Return the views of environment `k`'s shard, and the environment's index there."""
+        """Return the views of the shard with environment `k`, and the environment's index in it."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
         return LocatedView(self.views[shard], k - self.bounds[shard])
