@@ -1,11 +1,11 @@
 """Cameras: projection of points to pixels, and of pixels to rays.
 
 A camera with a lens has two kinds of pixel coordinates: `pinhole` pixels, which result from a
-linear projection and which trackers use, and `image` pixels, which detectors find. Without a lens,
-both are equal.
+linear projection and are used by trackers, and `image` pixels of the distorted image, which are
+used by detectors. Without a lens, both are equal.
 
-Pixel coordinates are continuous from the image's top-left corner: pixel centres lie at
-half-integers. Camera axes are OpenCV's: +X right, +Y down, +Z forward.
+Pixel coordinates are continuous and measured from the image's top-left corner, so that pixel
+centres have half-integer coordinates. Camera axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Positions that the tool of a robot must reach, and a check that the arm is long enough."""
+"""Positions that the tool of a robot must reach, and a check of the arm's length."""
 
 import itertools
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from hrc_env.core.typing import Points3
 from hrc_env.geometry.chains import SerialChain, link_frames
 
 Triple = tuple[float, float, float]
-"""Three coordinates."""
+"""A tuple of three coordinates."""
 
 
 @answer_unknown_fields
@@ -22,17 +22,17 @@ class ReachTarget:
     """A position that the tool point of a robot must reach."""
 
     name: str
-    """Name of the target with its article, for error messages."""
+    """Name of the target including its article (such as "the goal"), for error messages."""
     place_world: Triple | Points3
     """Position of the target in the world frame [m]."""
     along_world: Triple | None = None
     """Unit vector along which the tool points at the target; None if any direction is allowed."""
     within_m: float = 0.0
-    """Tolerance: greatest distance from the target that counts as reached [m]."""
+    """Tolerance: maximum distance from the target at which it counts as reached [m]."""
 
 
 class WristReach(NamedTuple):
-    """The sphere around an arm's second joint that contains all positions of its last joint."""
+    """A sphere around the second joint of an arm that contains all positions of its last joint."""
 
     shoulder_world: Points3
     """(3,) position of the second joint in the world frame [m]."""
@@ -51,7 +51,7 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
 
     Raises:
         ConfigError: a target requires a greater distance between the second and the last joint than
-            is possible.
+            the arm can reach.
     """
     if chain.slides.any():
         return

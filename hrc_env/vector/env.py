@@ -266,8 +266,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             part.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> tuple[Any, ...] | None:  # type: ignore[override]
-        """Return the picture or the list of pictures of every environment, depending on the render
-        mode.
+        """Return the picture, or in list modes the list of pictures, of every environment.
 
         The pictures are rendered one after the other, which is slow.
 

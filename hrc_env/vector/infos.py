@@ -56,7 +56,7 @@ def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 
 
 def _fill(batch: int, values: NDArray[Any]) -> NDArray[Any]:
-    """Return an array (B,) of missing values, with a given dtype: NaN, or -1 for integers."""
+    """Return an array (B,) of missing values (NaN, or -1 for integers) of the dtype of `values`."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
 
 
