@@ -19,9 +19,9 @@ class OpenGL(NamedTuple):
     """The state of OpenGL on a machine."""
 
     is_ready: bool
-    """Whether pictures can be rendered."""
+    """Whether OpenGL can render pictures."""
     message: str
-    """A sentence that describes the state."""
+    """A sentence that describes the state, for users."""
 
 
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:
@@ -62,11 +62,12 @@ def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool
 
 
 def find_opengl(console: Console, installs: bool = True) -> OpenGL:
-    """Return whether OpenGL can render pictures, and install it if that is allowed.
+    """Return the state of OpenGL, after installing it if necessary and allowed.
 
     Args:
         console: console for messages.
-        installs: whether Debian's OpenGL is installed if none is found and the user is root.
+        installs: whether Debian's OpenGL packages are installed if OpenGL is not found and the user
+            is root.
     """
     from hrc_env.scene import gl
 
