@@ -100,8 +100,7 @@ class Bystanders(Stateful):
         self.people[b], self.since[b], self.given_up[b] = [], 0, 0
 
     def others(self, ids: Ints, dt_s: float) -> Others:
-        """Return the confirmed bystanders of environments `ids`, given the duration of a step [s].
-        """
+        """Return the confirmed bystanders of environments `ids`; a step lasts for `dt_s` [s]."""
         others = no_others(len(ids))
         for row, b in enumerate(ids.tolist()):
             confirmed = [person for person in self.people[b] if person.is_confirmed]
