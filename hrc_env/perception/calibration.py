@@ -105,7 +105,7 @@ class Calibration:
     confidence: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS, len(KNOTS))]
     """(P, S, K, Z) quantiles of the reported visibility at `KNOTS`, in ascending order."""
     follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """(S, K) negative correlation of the reported visibility with the size of the error."""
+    """(S, K) correlation of the reported visibility with the negative size of the error."""
     swap_share: Annotated[Floats, (N_POSTURES, N_VIEWS, 2)]
     """(P, A, 2) fraction of the time in which the left and right labels of all joints, and of the
     legs only, are swapped."""
@@ -134,14 +134,12 @@ _RENEW = "make a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """Read a calibration file, by default the packaged one; raise `ConfigError` if it is invalid.
-    """
+    """Read a calibration file (default: the package's); raise `ConfigError` if it is invalid."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
 def changed_ns(path: Path | str) -> int:
-    """Return the modification time of a calibration file [ns], or raise `ConfigError` without one.
-    """
+    """Return the modification time of a calibration file [ns]; raise `ConfigError` without one."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError as error:

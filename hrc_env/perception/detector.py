@@ -78,8 +78,8 @@ class DetectorConfig:
     check_presence: float = 0.9
     """Presence score [0..1] below which a detection is verified by the detector stage."""
     check_every: int = 25
-    """Number of detections between verifications by the detector stage that do not depend on the
-    presence score; 25 means once per second at 25 Hz."""
+    """Interval, in detections, at which a detection is verified by the detector stage even if its
+    presence score is high; 25 means once per second at 25 Hz."""
     max_hip_offset: float = 0.25
     """Maximum distance of the hips from the centre of the window, as a fraction of its side. Hips
     farther away are attributed to another person."""

@@ -23,7 +23,7 @@ is rotated with the torso. The pixel of joint j of kind k in camera c is
   coefficient exp(-dt / `slow_s` - dt v / `slow_m`) per step, where v is the mean speed of the
   joints.
 - The reported visibility is sampled from its measured quantiles (`confidence`) by a normal variable
-  that is negatively correlated with the size of the errors (`follows`, `common`).
+  that is correlated with the negative size of the errors (`follows`, `common`).
 - Tables are given for bodies that stand, walk, handle objects, bend or squat (`folded`), and kneel;
   the posture is computed from the joints (`hrc_env/perception/outline.py`).
 - Occlusion is computed geometrically, by intersections of rays with the scene, the robot, bodies

@@ -1,8 +1,8 @@
-"""Inference of networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
+"""Inference with OpenVINO, which is an optional extra: pip install "hrc_env[openvino]".
 
-OpenVINO evaluates only the operators that the requested outputs need. On processors with 16-bit
-floating-point arithmetic (bf16: AVX512_BF16 or AMX), it takes half of LiteRT's time, and landmarks
-differ by a quarter of a pixel.
+OpenVINO evaluates only the operators that are needed for the requested outputs. On processors with
+16-bit floating-point arithmetic (bf16: AVX512_BF16 or AMX), it requires half of LiteRT's computing
+time, and landmarks differ by a quarter of a pixel.
 """
 
 import functools
@@ -38,7 +38,7 @@ def check_installed() -> None:
 
 
 def precision() -> str:
-    """Return the precision of networks: "bf16" if the processor supports it, else "f32"."""
+    """Return the precision of inference: "bf16" if the processor supports it, otherwise "f32"."""
     return "bf16" if "BF16" in _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES") else "f32"
 
 
