@@ -41,9 +41,9 @@ LIMIT, FOLD = 6, 7
 """Columns of a lens's row with the distorted radius beyond which nothing is imaged [focal lengths]
 and the corresponding angle from the optical axis [rad]."""
 WIDEST_RAD = math.radians(175.0)
-"""Greatest angle from the optical axis that a fisheye lens can image [rad]."""
+"""Maximum angle from the optical axis that a fisheye lens can image [rad]."""
 PINHOLE_RAD = math.radians(80.0)
-"""Greatest angle from the optical axis at which undistorted points are defined [rad]."""
+"""Maximum angle from the optical axis at which undistorted points are defined [rad]."""
 FAR = 1e6
 """Factor by which points that a lens does not image are moved away from the image centre."""
 _SAMPLES = 4096

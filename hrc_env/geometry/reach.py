@@ -37,7 +37,7 @@ class WristReach(NamedTuple):
     shoulder_world: Points3
     """(3,) position of the second joint in the world frame [m]."""
     radius_m: float
-    """Greatest distance of the last joint from the second one [m]."""
+    """Maximum distance of the last joint from the second one [m]."""
 
 
 def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
@@ -76,7 +76,7 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
 def wrist_reach(chain: SerialChain) -> WristReach:
     """Return the reach of an arm's last joint.
 
-    It is the greatest distance over all poses with joint angles of multiples of 90 degrees; arms of
+    It is the maximum distance over all poses with joint angles of multiples of 90 degrees; arms of
     the usual designs reach farthest in one of these poses.
     """
     steps = 0.5 * np.pi * np.arange(-2, 3)

@@ -55,7 +55,7 @@ def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.
         px: (B, C, W, J, 2) pixels; NaN where missing.
         sigma_px: (B, C, W, J) standard deviations [px]; only views with finite and positive ones
             are used.
-        gate_sigma: greatest reprojection error of agreeing views, in standard deviations; if 0, all
+        gate_sigma: maximum reprojection error of agreeing views, in standard deviations; if 0, all
             views are used.
 
     Raises:
@@ -291,7 +291,7 @@ def consensus_point(
         z: (C, 2) pixels.
         sigma: (C,) standard deviations [px].
         ok: (C,) mask of the candidate views.
-        gate_sigma: greatest reprojection error of agreeing views, in standard deviations.
+        gate_sigma: maximum reprojection error of agreeing views, in standard deviations.
         point: (3,) output: the point of these views [m].
         cov: (3, 3) output: the covariance of the point [m^2].
         use: (C,) output: the mask of the agreeing views.

@@ -82,7 +82,7 @@ def limit_command(
     The reported values are
 
     - "clearance_m" (B,): the smallest clearance D of the relevant pairs [m], NaN if there are none;
-    - "slack" (B,): the greatest violation of a constraint, including retreats [m/s];
+    - "slack" (B,): the maximum violation of a constraint, including retreats [m/s];
     - "unknown" (B,): 1 while a worker's position is unknown or the last detection is too old.
 
     Args:
@@ -334,7 +334,7 @@ def limit_speed(
 
 @kernel
 def find_slack(constraints: Constraints, allowed: JointVelocities, slack: Floats) -> None:
-    """Write the greatest constraint violation of the `allowed` velocities to `slack` (B,) [m/s]."""
+    """Write the maximum constraint violation of the `allowed` velocities to `slack` (B,) [m/s]."""
     for e in range(len(allowed)):
         slack[e] = 0.0
         for r in range(constraints.n_rows[e]):

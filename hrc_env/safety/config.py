@@ -47,7 +47,7 @@ class ShieldParams(NamedTuple):
     reaction_s: float
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float
-    """Greatest deceleration of a point of the robot [m/s^2]."""
+    """Maximum deceleration of a point of the robot [m/s^2]."""
     gain_hz: float
     """Gain of a retreat: its speed divided by the amount by which the clearance is negative
     [1/s]."""
@@ -115,7 +115,7 @@ class ShieldConfig:
     reaction_s: float = 0.08
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float = 3.0
-    """Greatest deceleration of a point of the robot, if its joints can achieve it [m/s^2]."""
+    """Maximum deceleration of a point of the robot, if its joints can achieve it [m/s^2]."""
     retreat_gain_hz: float = 4.0
     """Gain of a retreat: its speed divided by the amount by which the clearance is negative
     [1/s]."""

@@ -83,11 +83,11 @@ class Robots(NamedTuple):
     radii_m: Floats
     """Radius of each capsule (K,) [m]."""
     low: JointVelocities
-    """Least joint velocities within reach (B, N) [rad/s]."""
+    """Minimum reachable joint velocities (B, N) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (B, N) [rad/s]."""
+    """Maximum reachable joint velocities (B, N) [rad/s]."""
     slew: Floats
-    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
+    """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Bodies(NamedTuple):
@@ -138,9 +138,9 @@ class Constraints(NamedTuple):
     n_rows: Ints
     """Number of constraints of each robot (B,)."""
     low: JointVelocities
-    """Least joint velocities within reach (B, N) [rad/s]."""
+    """Minimum reachable joint velocities (B, N) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (B, N) [rad/s]."""
+    """Maximum reachable joint velocities (B, N) [rad/s]."""
     clearance_m: Floats
     """Smallest clearance D of the relevant pairs (B,) [m]; infinite if there are none."""
 
@@ -153,11 +153,11 @@ class Arm(NamedTuple):
     slides: Bools
     """Whether each joint is a slide (N,)."""
     low: JointVelocities
-    """Least joint velocities within reach (N,) [rad/s]."""
+    """Minimum reachable joint velocities (N,) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (N,) [rad/s]."""
+    """Maximum reachable joint velocities (N,) [rad/s]."""
     slew: Floats
-    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
+    """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Body(NamedTuple):
@@ -490,11 +490,11 @@ def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -
 def bound_approach(
     clearance_m: float, braking_m_s2: float, is_lost: bool, params: ShieldParams
 ) -> float:
-    """Return the greatest speed of approach [m/s]; a negative value is the least speed of retreat.
+    """Return the maximum speed of approach [m/s]; a negative value is the minimum speed of retreat.
 
     Args:
         clearance_m: clearance D [m].
-        braking_m_s2: greatest deceleration of the point [m/s^2].
+        braking_m_s2: maximum deceleration of the point [m/s^2].
         is_lost: whether the worker's position is only known from an earlier detection; the robot
             does not retreat from such workers.
         params: reaction time, and gain and limit of a retreat.
@@ -512,13 +512,13 @@ def bound_approach(
 def bound_touch(
     near_m: float, touch_m_s: float, braking_m_s2: float, params: ShieldParams
 ) -> float:
-    """Return the greatest speed of approach to a segment that may be touched [m/s].
+    """Return the maximum speed of approach to a segment that may be touched [m/s].
 
     Args:
         near_m: gap - margin - Z_d [m].
         touch_m_s: allowed speed of the robot in the touch [m/s]; with 0 it only makes small
             corrections.
-        braking_m_s2: greatest deceleration of the point [m/s^2].
+        braking_m_s2: maximum deceleration of the point [m/s^2].
         params: reaction time and speed of corrections.
     """
     if touch_m_s == 0.0:
@@ -533,7 +533,7 @@ def keep_tightest(row: Floats, bound: float, e: int, out: Constraints) -> None:
 
     Args:
         row: (N,) row n.J.
-        bound: greatest speed of approach [m/s].
+        bound: maximum speed of approach [m/s].
         e: index of the environment.
         out: constraints so far.
     """

@@ -25,7 +25,7 @@ class BodyRegion:
     name: str
     """Name of the region."""
     quasi_static_n: float
-    """Greatest permitted clamping force [N]."""
+    """Maximum permitted clamping force [N]."""
     stiffness_n_m: float
     """Spring constant of the region [N/m]."""
     mass_kg: float
@@ -113,7 +113,7 @@ def contact_force(region: str, relative_m_s: ArrayLike, robot_kg: ArrayLike) -> 
 
 
 def permitted_contact_speed(region: str, robot_kg: ArrayLike) -> Floats:
-    """Return the greatest relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
+    """Return the maximum relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
 
     It is 0 if no contact with the region is permitted.
 

@@ -124,13 +124,13 @@ class Summary:
     separation_violated: float
     """1 if the robot moves towards any worker within the protective distance, else 0."""
     contact_robot_speed_m_s: float
-    """Greatest directed speed of the robot before a contact that begins [m/s]."""
+    """Maximum directed speed of the robot before a contact that begins [m/s]."""
     contact_closing_speed_m_s: float
-    """Greatest closing speed of a contact that begins [m/s]."""
+    """Maximum closing speed of a contact that begins [m/s]."""
     contact_force_ratio: float
-    """Greatest force of a contact that begins, divided by the permitted force."""
+    """Maximum force of a contact that begins, divided by the permitted force."""
     contact_severity: float
-    """Greatest severity of a contact that begins; 0 if none begins."""
+    """Maximum severity of a contact that begins; 0 if none begins."""
     contacts_towards: float
     """Number of contacts in the episode so far in which the robot moved towards the worker."""
     contacts_fleeing: float
