@@ -11,9 +11,9 @@ rotation = [1.2, -1.2, 1.1]
 translation = [0.1, 1.4, 3.1]
 
 `rotation` (a Rodrigues vector or a matrix) and `translation` transform points from the world to the
-camera frame. `fisheye = true` selects OpenCV's fisheye model. These tools measure pixel coordinates
-from the centre of the first pixel, but this package from the image's corner: half a pixel is added
-to the principal point.
+camera frame. `fisheye = true` selects OpenCV's fisheye model. Because these tools measure pixel
+coordinates from the centre of the first pixel, and this package measures them from the image's
+corner, half a pixel is added to the principal point.
 """
 
 import math
@@ -30,7 +30,7 @@ from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, ma
 from hrc_env.geometry.rotations import from_rotation_vector
 
 ENTRIES = ("size", "matrix", "distortions", "rotation", "translation")
-"""Entries that the table of a camera must contain."""
+"""Names of the entries that the table of a camera must contain."""
 HALF_PX = 0.5
 """Distance along each axis from the centre of the first pixel to the image's corner [px]."""
 MAX_SPREAD_M = 30.0

@@ -150,7 +150,7 @@ def distorted_radius(lens: Lens, angle_rad: float) -> float:
 
 @kernel
 def _distort_all(row: Floats, places: Floats, out: Floats) -> None:
-    """Convert undistorted points (n, 2) to distorted ones, `out` (n, 2)."""
+    """Convert undistorted points (n, 2) to distorted points `out` (n, 2)."""
     for i in range(len(places)):
         out[i, 0], out[i, 1] = distort_point(row, places[i, 0], places[i, 1])
 

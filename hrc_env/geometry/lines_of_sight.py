@@ -50,7 +50,7 @@ def cameras_of(P: Floats) -> Records1[Camera]:
 
 @kernel
 def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
-    """Fill in the fields of cameras (C,) from their projection matrices P (C, 3, 4)."""
+    """Compute the fields of cameras (C,) from their projection matrices P (C, 3, 4)."""
     for c in range(len(P)):
         a, camera, inverse = P[c], cameras[c], cameras[c].back
         for i in range(3):

@@ -234,7 +234,7 @@ def _cross_plane(table: Floats, row: int, eye: Vector, direction: Vector) -> Pas
 
 @kernel
 def _cross_slab(height: float, rise: float, half: float) -> Passage:
-    """Return the interval over which a line is between parallel planes at -half and half [m]."""
+    """Return the interval over which a line is between planes at `-half` and `half` [m]."""
     if rise == 0.0:
         return ALWAYS if abs(height) <= half else NEVER
     one, other = (-half - height) / rise, (half - height) / rise

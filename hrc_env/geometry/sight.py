@@ -45,7 +45,7 @@ class Occluders(NamedTuple):
     """A table of shapes, with the workers' capsules last, and a list of the shapes in view."""
 
     table: Floats
-    """(G, `shapes.WIDTH`) all shapes."""
+    """(G, `shapes.WIDTH`) table of all shapes."""
     first_body: int
     """Row of the first of the workers' capsules."""
     spheres: Floats
@@ -253,7 +253,7 @@ def _hits_sphere(view: Floats, i: int, line: Line) -> bool:
 
 @kernel
 def _is_blocked(passage: Passage, length: float) -> bool:
-    """Return whether a line of the given length [m] enters a shape, or leaves it from inside."""
+    """Return whether a line of the given length [m] enters a shape or leaves it from inside."""
     if passage.enter > passage.leave:
         return False
     first = passage.enter if passage.enter >= 0.0 else passage.leave

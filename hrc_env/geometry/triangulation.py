@@ -37,7 +37,7 @@ class Triangulation:
 
 
 class Pixel(NamedTuple):
-    """The projection of a point into a camera."""
+    """Projection of a point into the image of a camera."""
 
     u: float
     """Column [px]."""

@@ -221,7 +221,7 @@ def _find_overlaps(capsules: Capsules, radius: Floats, footprints: Floats, overl
 
 @kernel
 def _from_rectangle(x: float, y: float, length: float, width: float) -> float:
-    """Return the distance of a point from a rectangle with these half sides around the origin."""
+    """Return the distance of a point from a rectangle around the origin, given its half sides."""
     return math.hypot(max(abs(x) - length, 0.0), max(abs(y) - width, 0.0))
 
 

@@ -36,7 +36,7 @@ BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 N_POSES = 32
 """Number M of poses that represent all poses in the data."""
 N_SEEN = len(JOINTS) + 1
-"""Number of possible counts of seen joints, from 0 to all joints."""
+"""Number of possible values of the number of visible joints, from 0 to all joints."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
 """(V,) reported visibilities at which the standard deviation is given."""
 KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
@@ -151,7 +151,7 @@ def changed_ns(path: Path | str) -> int:
 
 @functools.lru_cache(maxsize=8)
 def _read(path: Path, changed: int) -> Calibration:
-    """Read a calibration file; the result is cached until the file changes."""
+    """Read a calibration file, and cache the result until the file changes."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:

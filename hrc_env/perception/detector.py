@@ -112,14 +112,14 @@ class DetectorConfig:
 
     @property
     def weights(self) -> tuple[str, ...]:
-        """Names of the weights that the chosen networks need."""
+        """Names of the weights files of the selected networks."""
         landmark = dict.fromkeys((self.network, self.folded_network))
         return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """The detection of a worker in the images of all cameras.
+    """Detection of a worker in the images of all cameras.
 
     For cameras that do not show the worker, pixels are NaN, confidences 0 and standard deviations
     infinite.
@@ -349,7 +349,7 @@ class PoseDetector(Stateful):
     def _write(
         self, seen: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
     ) -> None:
-        """Store the joints (J, 3) found in a window of camera c in a detection."""
+        """Store the joints (J, 3) that were found in a window of camera c in a `Detection`."""
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)

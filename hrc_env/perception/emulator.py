@@ -88,7 +88,7 @@ class EmulatorConfig:
         self.make_calibration()
 
     def make_calibration(self) -> Calibration:
-        """Return the calibration with these settings; raise `ConfigError` for an invalid file."""
+        """Return the calibration modified by the settings; raise `ConfigError` if it is invalid."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)

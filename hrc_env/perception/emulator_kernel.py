@@ -285,7 +285,7 @@ def emulate_batch(
 
 @kernel
 def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
-    """Return the index of the track whose image windows show a worker, or -1 if there is none.
+    """Return the index of the track with image windows that show a worker, or -1 if there is none.
 
     The returned track has the predicted mid-hip nearest to that of the worker, at a distance below
     `FOLLOWED_M`, because the detector searches for a person in windows around the predicted body.

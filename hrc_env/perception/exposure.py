@@ -47,7 +47,7 @@ ROUNDING = math.sqrt(1.0 / 12.0)
 UNEVEN: NDArray[np.float32] = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 """Filter that removes edges and gradients and multiplies noise by six (Immerkaer 1996)."""
 NOISE_STEP = 4
-"""Factor by which an image is reduced before its noise is measured."""
+"""Factor by which the size of an image is reduced before its noise is measured."""
 OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0

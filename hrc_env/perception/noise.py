@@ -33,7 +33,7 @@ FARTHEST_M = 0.25
 
 
 class Offsets(NamedTuple):
-    """The part of a calibration that converts the network's joints to ours."""
+    """The part of a calibration that relates the network's joints to those of our skeleton."""
 
     tables: Floats
     """(P, K * 6) mean offset (3) [m] and its variance (3) [m^2], by posture and kind of joint, in
@@ -147,7 +147,7 @@ def _correct_joints(
 def _correct_joint(
     joint: Points3, cov: Covariances3, front: Facing, offset: Floats, hand: float
 ) -> None:
-    """Subtract the mean offset of a joint, and add the variance of the offset.
+    """Subtract the mean offset from a joint's position, and add the offset's variance.
 
     Args:
         joint: (3,) mean position, which is changed [m].

@@ -18,7 +18,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Tensor
 
 Network: TypeAlias = Callable[[Tensor], list[Tensor]]
-"""Function from an image (H, W, 3) to copies of the requested outputs; it is not thread-safe."""
+"""Function from an image (H, W, 3) to copies of the requested outputs. It is not thread-safe."""
 INSTALL = 'pip install "hrc_env[openvino]"'
 """Command that installs OpenVINO."""
 
@@ -43,7 +43,7 @@ def precision() -> str:
 
 
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
-    """Load a .tflite file as a function from an image to named outputs, which uses one thread.
+    """Load a .tflite file as a single-threaded function from an image to named outputs.
 
     Args:
         path: path of the file.

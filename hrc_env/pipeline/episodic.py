@@ -84,11 +84,11 @@ class _Part:
     """The subset of the requested environments that share a pipeline."""
 
     pipeline: PerceptionPipeline
-    """The pipeline of these environments."""
+    """Pipeline that the environments share."""
     rows: Ints
-    """(n,) rows of these environments in the requested batch."""
+    """(n,) rows of the environments in the requested batch."""
     ids: Ints
-    """(n,) indices of these environments in the pipeline."""
+    """(n,) indices of the environments in the pipeline."""
     columns: Ints
     """(C,) indices of the pipeline's cameras in `EpisodicPipeline.names`."""
 
@@ -198,7 +198,7 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.crops(b)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
+        """Return the appearance of environment `b`'s episode, or None for the default one."""
         pipeline, b = self._place(b)
         return pipeline.look_of(b)
 
@@ -315,7 +315,7 @@ class EpisodicSensor(Sensor):
 
     Args:
         needs_truth: whether the sensors require a `TrueSensorInput`.
-        parts: function that groups environments by pipeline.
+        parts: function that groups the environments by their pipeline.
     """
 
     def __init__(self, needs_truth: bool, parts: Callable[[Ints], list[_Part]]) -> None:

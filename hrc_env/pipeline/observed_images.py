@@ -60,7 +60,7 @@ class ObservedImages:
 
         Args:
             now: the scene, with one row per environment.
-            looks: (B,) appearance of each environment; None for the scene as built.
+            looks: (B,) appearance of each environment; None for the default appearance.
             rigs: (B,) cameras of each episode; images of all other cameras are black.
         """
         images = {name: np.zeros((len(now.ids), *self.shape), np.uint8) for name in self.names}
@@ -99,7 +99,7 @@ class ObservedImages:
 def _select_cameras(
     rig: tuple[PinholeCamera, ...], choices: Sequence[int | str] | None
 ) -> tuple[PinholeCamera, ...]:
-    """Return the cameras of a rig with these names or indices, or all if `choices` is None."""
+    """Return the cameras of a rig with the given names or indices; for None, all cameras."""
     names = [camera.name for camera in rig]
     chosen: list[int] = []
     for choice in range(len(rig)) if choices is None else choices:

@@ -47,7 +47,7 @@ class RenderedCameras(ImageSensor):
         self.images, self.has_times = self.film, not schedule.is_plain
         self.history = History(batch, schedule)
         self.episode_looks: list[Look | None] = [None] * batch
-        """(B,) appearance of each environment's episode; None for the scene as built."""
+        """(B,) appearance of each environment's episode; None for the default appearance."""
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
         """Delete the images of environments `ids`, and sample new faults and a new appearance."""
@@ -116,7 +116,7 @@ class PixelPipeline(ImageTracking):
             detector.pose_detector.borrow_networks(like.worker_detector.pose_detector)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment b's episode, or None for the scene as built."""
+        """Return the appearance of environment b's episode, or None for the default one."""
         return self.cameras.episode_looks[b]
 
     def schedule_of(self, b: int) -> Schedule:

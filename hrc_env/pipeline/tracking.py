@@ -109,7 +109,7 @@ class PerceptionPipeline(Stateful):
         return []
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
+        """Return the appearance of environment `b`'s episode, or None for the default one."""
         return None
 
     def schedule_of(self, b: int) -> Schedule | None:
@@ -191,7 +191,7 @@ class PoseTracking(PerceptionPipeline):
         self.monitored = make_monitor(batch, n_cameras)
         self.presence = Presence(batch, n_workers, setup.coverage)
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
-        """(C, 3) principal point and focal length [px]."""
+        """(C, 3) principal point (x, y) and focal length of each camera [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Delete the tracks and the images of environments `ids`."""
@@ -287,7 +287,7 @@ class PoseTracking(PerceptionPipeline):
         return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Detect the keypoints of people in image pixels, without their identities.
+        """Detect the keypoints of people, in image pixels and without association to workers.
 
         Args:
             ids: (B,) indices of environments.

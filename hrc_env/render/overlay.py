@@ -41,7 +41,7 @@ SHIELD: Colour = (255, 90, 60)
 FLOOR_M = 3
 """Half the side length of the grid on the floor [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
-"""Colours of bones with both ends on the same side of the body; other bones have `MIDDLE`."""
+"""Colours of bones with both ends on the same side of the body; other bones are `MIDDLE`."""
 
 
 class Projection(NamedTuple):
@@ -240,7 +240,7 @@ def _project(image: Image, camera: PinholeCamera, points: Floats) -> Projection:
 def _ellipses(
     image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
-    """Draw the projected 2-sigma regions of joints, to first order.
+    """Draw the 2-sigma ellipses of joints, by linearized projections of their covariances.
 
     Args:
         image: a picture of the camera, which is changed.

@@ -83,7 +83,8 @@ class Shade:
     deep_m: float
     """Distance of the far plane from the near plane [m]."""
     corner: tuple[float, float]
-    """Coordinates of the first pixel's corner along the right and down axes of `sun_axes` [m]."""
+    """Coordinates of the corner of the first pixel along the axes right and down of `sun_axes`
+    [m]."""
     step_m: float
     """Side length of a pixel [m]."""
 
@@ -256,7 +257,7 @@ class Stage(Canvas):
 
 
 def _key(camera: PinholeCamera, shadows: bool) -> tuple[Hashable, ...]:
-    """Return the key under which the backdrop of a camera is stored."""
+    """Return the key under which the backdrop of a camera is cached."""
     view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
     return (*view, camera.width_px, camera.height_px, shadows)
 

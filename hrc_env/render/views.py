@@ -99,7 +99,7 @@ class Glance:
     motion: WorkerMotion
     """Poses of the workers, arrays (W, S, ...)."""
     look: Look | None
-    """Appearance of the episode; None for the scene as built."""
+    """Appearance of the episode; None for the default appearance."""
     markers_world: Points3
     """(M, 3) positions of the task's markers [m]."""
     cameras: tuple[PinholeCamera, ...]

@@ -47,8 +47,8 @@ from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
 NO_APPROACH_WEIGHT, RETREAT_WEIGHT = 1e4, 30.0
-"""Weights of violations [m/s] of the constraints against approaching and to retreat, relative to
-changes of joint velocities [rad/s]."""
+"""Weights of violations [m/s] of the constraints against approaching and of those to retreat,
+relative to changes of joint velocities [rad/s]."""
 TOLERANCE_M_S = 1e-6
 """Violation below which a constraint counts as satisfied [m/s]."""
 
@@ -237,7 +237,7 @@ def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -
 def scale_velocities(
     constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
 ) -> None:
-    """Scale the velocities of all joints by one factor until every constraint holds.
+    """Scale the velocities of all joints by one factor so that every constraint is satisfied.
 
     Args:
         constraints: constraints of every robot.

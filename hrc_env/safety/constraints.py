@@ -466,7 +466,7 @@ def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach
 
 @kernel
 def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -> Reach:
-    """Write n.J of a point of a robot to `row`, and return the velocities along n within reach.
+    """Write n.J of a point of a robot to `row`, and return the reachable motion along n.
 
     Args:
         arm: the robot.

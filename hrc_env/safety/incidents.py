@@ -388,7 +388,7 @@ def _find_greater(value: float, other: float) -> float:
 
 
 class IncidentMonitor(Stateful):
-    """Detector of incidents that keeps the history of each worker over the steps."""
+    """Detector of incidents, which stores the history of each worker over the steps."""
 
     CHANGES = ("history",)
 

@@ -67,7 +67,7 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
 
 
 def check_shield(description: str, shield: Callable[..., Any]) -> None:
-    """Raise `ConfigError` for a function whose parameters are not those of a shield."""
+    """Raise `ConfigError` if the parameters of a function are not those of a shield."""
     check_arguments(description, shield, "belief", "velocities", "dt_s")
 
 

@@ -79,7 +79,7 @@ def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -
 def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
     """Return the speed limit (B,) due to hidden hands of tracked workers [m/s].
 
-    A hidden hand may be anywhere within an arm's length of its shoulder, in any direction.
+    A hidden hand is assumed to be anywhere within an arm's length of its shoulder.
     """
     estimate, limit = belief.estimate, np.full(len(belief.estimate.tracked), np.inf)
     cov = estimate.cov_world[:, :, WRISTS]

@@ -252,7 +252,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return dict(self._options[k])
 
     def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Fix parts of all future episodes of environment `k` alone."""
+        """Fix parts of all future episodes of the single environment `k`."""
         given = lasting_options(options)
         fixed = self.shards.first.fix(given) if given else None
         self._options = [given if b == k else each for b, each in enumerate(self._options)]

@@ -47,7 +47,7 @@ def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 
     Args:
         result: result of environments `ids`.
-        ids: indices of these environments.
+        ids: indices of the environments in the result.
         batch: number of all environments, B.
     """
     table = InfoTable({name: _fill(batch, values) for name, values in result.info.items()})

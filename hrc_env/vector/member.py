@@ -141,7 +141,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def render_mode(self) -> str | None:  # type: ignore[override]
-        """Render mode of every environment."""
+        """Render mode, which is the same for all environments."""
         return self._vector.render_mode
 
     @property

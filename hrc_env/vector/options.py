@@ -175,7 +175,7 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
 
 
 def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
-    """Return the number of steps of one environment's time limit that have passed.
+    """Return the number of elapsed steps of the time limit of a single environment.
 
     Args:
         options: "steps_left" or "elapsed_steps" of the environment.

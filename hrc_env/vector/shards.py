@@ -53,11 +53,11 @@ class Shards:
 
         Args:
             ids: (n,) sorted indices of the environments.
-            rngs: random generators of these n environments.
+            rngs: random generators of the n environments.
             fixed: fixed parts of each episode; empty if nothing is fixed.
 
         Returns:
-            The result of these environments, with n rows.
+            The result of the n environments that are reset.
         """
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)

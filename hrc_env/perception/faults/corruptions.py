@@ -1,4 +1,4 @@
-"""Effects of camera faults on images."""
+"""Simulation of the effects of camera faults on images."""
 
 import math
 from collections.abc import Callable
@@ -70,9 +70,10 @@ def _defocus(view: CropView, radius_px: float) -> Image:
 
 
 def _add_noise(view: CropView, levels: float) -> Image:
-    """Add independent noise of each camera pixel to a crop [grey levels].
+    """Add noise to a crop that is independent for each camera pixel [grey levels].
 
-    If the crop has a higher resolution than the image, the noise is enlarged accordingly.
+    If the resolution of the crop is higher than that of the image, the noise is enlarged with the
+    image.
     """
     crop = view.crop
     n = min(max(round(view.window.side_px), 8), len(crop))

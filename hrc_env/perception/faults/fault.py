@@ -22,10 +22,10 @@ appearance of images."""
 
 
 class Kind(NamedTuple):
-    """A kind of fault."""
+    """Description of a kind of fault."""
 
     group: str
-    """Group of the kind: `TIMING`, `PLACE` or `IMAGE`."""
+    """Group of the fault: `TIMING`, `PLACE` or `IMAGE`."""
     unit: str
     """Unit of the fault's amount."""
     usual: float
@@ -69,7 +69,7 @@ KINDS: dict[str, Kind] = {
 }
 """All kinds of faults, by name."""
 ALL = "all"
-"""Value that stands for all cameras, instead of a camera's name."""
+"""Value of `FaultConfig.cameras` that selects all cameras."""
 
 
 @answer_unknown_fields
@@ -154,7 +154,7 @@ class FaultConfig:
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
-    """Raise `ConfigError` if a fault refers to a camera that is not in the rig with these names."""
+    """Raise `ConfigError` if a fault refers to a camera that is not in the rig."""
     for fault in faults:
         for camera in fault.cameras:
             if not isinstance(camera, str):

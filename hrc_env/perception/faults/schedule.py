@@ -55,7 +55,7 @@ class Arrivals(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """The timing of the cameras' images over an episode, and the cameras' faults."""
+    """Schedule of the cameras' images and faults over an episode."""
 
     cameras: tuple[CameraConfig, ...]
     """Cameras of the rig, with their calibrated poses."""
