@@ -279,7 +279,7 @@ class PoseDetector(Stateful):
         folded: bool,
         posture: Sequence[float],
     ) -> Detection:
-        """Detect a worker's joints in these windows (C,); see `detect`."""
+        """Detect a worker's joints in the given windows (C,); see `detect`."""
         counts = self._counts.setdefault(track, [0] * len(self.cameras))
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
         seen, doubts = _no_detection(windows), [1.0] * len(windows)

@@ -28,7 +28,7 @@ BLANK = (0.59, 0.92)
 """Contrasts below which all parts of an image are blank, and above which none is, in units of
 `LEAST_CONTRAST`."""
 USELESS = 0.18
-"""Noise above which people are missed, as `exposure.USELESS`, but for the noise that is modelled
+"""Noise above which people are missed, like `exposure.USELESS`, but for the noise that is modelled
 here."""
 NOISE: Floats = np.array([0.160, 0.170, 0.200, 0.230, 0.260])
 """Noise levels at which `MISSED` is given, as fractions of the span."""

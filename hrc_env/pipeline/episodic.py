@@ -31,7 +31,7 @@ class CameraSetup:
     """The cameras of one episode."""
 
     rig: tuple[CameraConfig, ...]
-    """Configurations of the cameras, which the estimator knows."""
+    """Configurations of the cameras, which are available to the estimator."""
     faults: tuple[FaultConfig, ...]
     """Faults of the cameras in the episode."""
     appearance: AppearanceConfig
@@ -103,7 +103,7 @@ class _PartRecord(NamedTuple, Generic[RecordT]):
 
 
 class _Place(NamedTuple):
-    """The pipeline of an environment and its index there."""
+    """The pipeline of an environment, and the environment's index in it."""
 
     pipeline: PerceptionPipeline
     """Pipeline of the environment."""
@@ -280,7 +280,7 @@ class EpisodicPipeline(PerceptionPipeline):
             self._own[b].pipeline.set_state(state)
 
     def _place(self, b: int) -> _Place:
-        """Return the pipeline of environment `b` and its index there."""
+        """Return the pipeline of environment `b`, and the environment's index in it."""
         return _Place(self._own[b].pipeline, 0) if b in self._own else _Place(self.shared, b)
 
     def _parts(self, ids: Ints) -> list[_Part]:

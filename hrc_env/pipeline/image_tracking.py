@@ -34,9 +34,9 @@ class ImageSensor(Sensor):
         raise NotImplementedError
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return a mask (B, C) of cameras that repeat their images, which do not prove absence.
+        """Return a mask (B, C) of the cameras that repeat their images.
 
-        The base class returns a mask (B, 1) that is False.
+        Repeated images do not prove the absence of people. The base class returns False, (B, 1).
         """
         return np.zeros((len(ids), 1), np.bool_)
 

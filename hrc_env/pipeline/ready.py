@@ -25,7 +25,7 @@ class OpenGL(NamedTuple):
 
 
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:
-    """Fetch the weights and compile the kernels that a perception level needs, if missing.
+    """Download the weights and compile the kernels that a perception level needs, if missing.
 
     Args:
         console: console for messages.
@@ -47,7 +47,7 @@ def make_ready(console: Console, level: str, draws: bool = False, installs: bool
 
 
 def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool = True) -> None:
-    """Fetch the missing weights of the default networks and of further ones.
+    """Download missing weights of the default networks and of further networks.
 
     Args:
         console: console for messages.

@@ -298,7 +298,7 @@ class Views:
         return {**self.__dict__, "_renderers": {}}
 
     def _make_view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
-        """Return the camera of a rig's camera or viewpoint, for pictures of the given size."""
+        """Return the chosen camera or viewpoint as a camera for pictures of the given size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
         return resize(chosen, width, height)
@@ -360,7 +360,7 @@ class Views:
 
 
 def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
-    """Return the camera of a rig, name of a viewpoint or custom camera that a choice refers to.
+    """Return the camera, or the name of the viewpoint, that a choice refers to.
 
     Raises:
         ConfigError: there is no such camera.

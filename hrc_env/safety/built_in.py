@@ -67,7 +67,7 @@ class ArmPose:
     """Poses of the links and capsules of the robots that a shield commands."""
 
     model: RobotModel
-    """Constants of the robot."""
+    """Constant properties of the robot."""
     frames: Transforms
     """Poses of the links in the world (B, N, 4, 4)."""
     links: Ints

@@ -75,7 +75,7 @@ class Robots(NamedTuple):
     frames: Transforms
     """Poses of the links in the world (B, N, 4, 4)."""
     slides: Bools
-    """Whether each joint is a slide (N,)."""
+    """Mask of the prismatic joints (N,)."""
     links: Ints
     """Index of the link that carries each capsule (K,)."""
     capsules: Capsules
@@ -149,9 +149,9 @@ class Arm(NamedTuple):
     """One robot, with the fields of one row of `Robots`."""
 
     frames: Transforms
-    """Frame of every joint's link (N, 4, 4), world_from_link."""
+    """Poses of the links in the world (N, 4, 4)."""
     slides: Bools
-    """Whether each joint is a slide (N,)."""
+    """Mask of the prismatic joints (N,)."""
     low: JointVelocities
     """Minimum reachable joint velocities (N,) [rad/s]."""
     high: JointVelocities

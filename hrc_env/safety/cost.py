@@ -30,7 +30,7 @@ FORMER_COMPONENT = "too_near"
 
 @dataclass(frozen=True, slots=True)
 class CostConfig:
-    """Events that count as unsafe, and whether a contact ends the episode."""
+    """Settings of the cost: unsafe events, and whether a contact ends the episode."""
 
     components: tuple[str, ...] = ("proximity", "contact")
     """Names of the components that are added up, from `COMPONENTS`. With the default ones, the cost
@@ -56,7 +56,7 @@ class CostConfig:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Cost of one step of each environment that follows from separations."""
+    """Costs of one step that depend on separations, for each environment."""
 
     proximity: Floats
     """1 for environments in which the separation was below `CostConfig.proximity_m`, otherwise 0

@@ -42,8 +42,7 @@ NEAR_MISS_M, CLEAR_M = 0.05, 0.10
 """Separations below which a near miss begins, and beyond which it ends if there was no touch [m].
 The values are estimates."""
 REACTION_S = 0.1
-"""Reaction time in the computation of the protective distance [s]. The value is typical of
-industrial robots."""
+"""Reaction time in the computation of the protective distance [s]. It is a typical value."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
 WITHIN, BEYOND, NEVER = 1, 2, 3
 """Severities of a contact: within the limit of the region, beyond the limit, and contact with the
@@ -79,7 +78,7 @@ class WorkerHistory:
     since_s: float
     """Time since the last touch of robot and worker [s]."""
     is_close: bool
-    """Whether robot and worker are so close that a near miss has begun and not ended."""
+    """Whether a near miss between robot and worker has begun and not yet ended."""
     contacts: Annotated[Ints, (len(KINDS),)]
     """Number of contacts of each kind in this episode."""
     near_misses: int
@@ -400,7 +399,7 @@ class IncidentMonitor(Stateful):
         model: RobotModel,
         dt_s: float,
     ) -> None:
-        """Begin with empty histories.
+        """Create empty histories.
 
         Args:
             batch: number of environments.

@@ -20,7 +20,7 @@ TOLERANCE_RAD_S = 1e-9
 
 
 class Problem(NamedTuple):
-    """The problem that `solve` solves, for one robot."""
+    """The optimization problem of one robot."""
 
     J: Floats
     """Rows of the constraints (M, N)."""

@@ -50,7 +50,7 @@ from hrc_env.vector.pictures import LISTS, Pictures
 from hrc_env.vector.shards import Shards
 
 Step: TypeAlias = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
-"""Result of a step, in the form of gymnasium."""
+"""Observation, rewards, terminated, truncated and infos of a step, as in gymnasium."""
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
@@ -337,7 +337,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(seed for _, seed in self._streams)
 
     def set_stream(self, k: int, stream: np.random.Generator) -> None:
-        """Set the random generator of environment `k`, whose seed is unknown (-1)."""
+        """Set the random generator of environment `k`, and its seed to -1 (unknown)."""
         if not isinstance(stream, np.random.Generator):
             raise ConfigError(f"np_random must be a numpy.random.Generator, got {stream!r}.")
         self._streams[k] = stream, -1

@@ -23,7 +23,7 @@ from hrc_env.step_result import StepResult
 
 @dataclass(frozen=True, slots=True)
 class InfoTable:
-    """Named values of B environments."""
+    """Infos of B environments, by name."""
 
     values: dict[str, Floats]
     """Numbers (B,) by name; NaN for an environment without a value."""

@@ -91,7 +91,7 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         return raise_first_error(super().call_wait(timeout))
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Decode the indices in infos to words, as `HRCVectorEnv.words` does."""
+        """Convert indices in infos to names, as `HRCVectorEnv.words` does."""
         return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
 
     def _set_next_options(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:

@@ -26,7 +26,7 @@ class LocatedView(NamedTuple):
 
 
 class Pictures:
-    """Renderer of the environments of shards.
+    """Renderer of pictures of the environments in shards.
 
     Args:
         shards: simulations of the environments.
