@@ -47,7 +47,7 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
         task: id of the task, for the error message.
         robot: name of the robot, for the error message.
         chain: geometry of the robot; robots with slides are not checked.
-        targets: the targets.
+        targets: positions that the tool point must reach.
 
     Raises:
         ConfigError: a target requires a greater distance between the second and the last joint than

@@ -216,7 +216,7 @@ def is_hidden(eye: Floats, points: Points3, j: int, occluders: Occluders, n_view
         eye: (3,) position of the eye [m].
         points: (J, 3) positions of the points [m].
         j: index of the point.
-        occluders: the shapes, after a call of `select_occluders`.
+        occluders: the shapes, as prepared by `select_occluders`.
         n_view: number of shapes in view, as returned by `select_occluders`.
     """
     table, view = occluders.table, occluders.spheres

@@ -292,7 +292,7 @@ def consensus_point(
         sigma: (C,) standard deviations [px].
         ok: (C,) mask of the candidate views.
         gate_sigma: maximum reprojection error of agreeing views, in standard deviations.
-        point: (3,) output: the point of these views [m].
+        point: (3,) output: the point computed from the agreeing views [m].
         cov: (3, 3) output: the covariance of the point [m^2].
         use: (C,) output: the mask of the agreeing views.
 

@@ -165,7 +165,7 @@ def draw_shield(image: Image, change_rad_s: float) -> None:
 
 
 def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Draw a text on a dark background.
+    """Draw text on a dark background.
 
     Args:
         image: the picture, which is changed.
@@ -182,7 +182,7 @@ def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour
 
 
 def write(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Draw a text in a picture.
+    """Draw text in a picture.
 
     Args:
         image: the picture, which is changed.

@@ -108,7 +108,7 @@ class Stage(Canvas):
     """A renderer of pictures from a few viewpoints, which renders static geoms once per viewpoint.
 
     Args:
-        scene: the scene.
+        scene: scene that is rendered.
         width: maximum width of a picture [px].
         height: maximum height of a picture [px].
     """

@@ -126,7 +126,7 @@ class Views:
     another thread.
 
     Args:
-        simulation: the simulation.
+        simulation: simulation of the environments that are shown.
     """
 
     def __init__(self, simulation: Simulation) -> None:

@@ -262,7 +262,7 @@ def add_floor_constraints(
         robots: link frames, capsules and velocities within reach.
         floor: patches of floor and their states.
         params: margins, limits and gains of the shield.
-        out: constraints so far, to which these are added.
+        out: present constraints, to which the new ones are added.
     """
     body, rod, limb = np.empty((2, 3)), np.empty(5), np.empty(5)
     normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
@@ -429,7 +429,7 @@ def find_nearest(capsule: Floats, segment: Floats, point: Floats, normal: Floats
         capsule: (2, 3) end points [m].
         segment: (2, 3) end points [m].
         point: (3,) receives the nearest point on the robot's axis [m].
-        normal: (3,) receives n, the unit vector from there to the body.
+        normal: (3,) receives n, the unit vector from that point to the body.
     """
     squared, u, t = closest_parameters(capsule[0], capsule[1], segment[0], segment[1])
     distance = math.sqrt(squared)

@@ -82,7 +82,7 @@ class Pictures:
         """Add a picture of the current step to the lists, in the modes `LISTS`.
 
         Args:
-            mask: (B,) mask of the environments whose picture is added.
+            mask: (B,) mask of the environments for which a picture is added.
             is_first: (B,) whether the step is the first of an episode, which clears the list.
         """
         if self.render_mode not in LISTS:

@@ -129,7 +129,7 @@ class Schedule:
         Args:
             rig: cameras with their calibrated poses.
             seed: seed of the episode's faults.
-            step: the step.
+            step: number of the step.
         """
         wrong = tuple(tuple(self.faults_of(PLACE, c, step)) for c in range(len(rig)))
         return _displace(rig, wrong, seed) if any(wrong) else rig
