@@ -33,6 +33,8 @@ ANY_ACTIVITY = -1
 """Value for a first activity that is drawn at random."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
+MIN_STAY_S = 0.05
+"""Shortest remaining stay at the first workplace of an episode [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,24 +232,38 @@ def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
 
 
 def take_first_place(decision: Decision) -> None:
-    """Choose a worker's first place and job; if all are taken, choose the most remote location."""
-    mind, worker, draw = decision.mind, decision.worker, decision.draws.item(NEXT)
-    begins = [k for k, _ in mind.schedule.begins]
-    near = draw < mind.config.near_probability or not begins
-    first = mind.schedule.robot if near else begins[int(decision.draws[BOW] * len(begins))]
-    jobs: tuple[int, ...] = (first, mind.schedule.robot, *begins)
+    """Choose the job and the workplace with which a worker begins an episode.
+
+    With probability `MotionConfig.near_probability` it is the job at the robot, otherwise a random
+    job that begins an errand. If its workplaces are taken, the job at the robot and all jobs that
+    begin errands are tried in turn. If a first activity is prescribed, only the jobs of this
+    activity are tried. If no workplace is free, the worker begins without an errand at the location
+    farthest from the other workers.
+
+    Args:
+        decision: inputs of the decision; its worker's `job`, `place_kind`, `place` and, at a
+            workplace, `stay_until_s` are set.
+    """
+    config, schedule, worker = decision.mind.config, decision.mind.schedule, decision.worker
+    robot_job, errand_jobs = schedule.robot, [choice.job for choice in schedule.begins]
+    is_at_robot = decision.draws.item(NEXT) < config.near_probability or not errand_jobs
+    preferred_job = robot_job
+    if not is_at_robot:
+        preferred_job = errand_jobs[int(decision.draws[BOW] * len(errand_jobs))]
+    candidate_jobs: tuple[int, ...] = (preferred_job, robot_job, *errand_jobs)
     if decision.first_activity is not None:
-        jobs = _list_jobs(decision, decision.first_activity, near)
-    for job in jobs:
-        chosen = mind.schedule.jobs[job]
-        for place in _list_free_places(decision, chosen):
-            worker.job, worker.place_kind = job, WORKPLACE_KINDS.index(chosen.at)
+        candidate_jobs = _list_jobs(decision, decision.first_activity, is_at_robot)
+    for k in candidate_jobs:
+        job = schedule.jobs[k]
+        for place in _list_free_places(decision, job):
+            worker.job, worker.place_kind = k, WORKPLACE_KINDS.index(job.at)
             worker.place[:] = place
-            dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-            worker.stay_until_s = max(0.05, dwell * decision.draws.item(LASTS))
+            dwell_s = decision.draw(DWELL, config.dwell_s) * config.people.tempo
+            # The episode begins in the middle of the stay, at a time of 0.
+            worker.stay_until_s = max(MIN_STAY_S, dwell_s * decision.draws.item(LASTS))
             return
-    worker.job, worker.place_kind = mind.schedule.robot, NOWHERE
-    worker.place[:] = _find_loneliest(decision)
+    worker.job, worker.place_kind = robot_job, NOWHERE
+    worker.place[:] = _find_remotest(decision)
 
 
 def group_jobs(schedule: Schedule) -> dict[str, list[int]]:
@@ -278,7 +294,7 @@ def _list_jobs(decision: Decision, activity: int, near: bool) -> tuple[int, ...]
     return tuple(sorted(turned, key=lambda k: near and schedule.jobs[k].at != "robot"))
 
 
-def _find_loneliest(decision: Decision) -> Place:
+def _find_remotest(decision: Decision) -> Place:
     """Return the walkable location that is farthest from the other workers."""
     grid = decision.mind.plan.grid
     x, y = (np.argwhere(grid.slack >= 0.0) * CELL_M + grid.origin).T

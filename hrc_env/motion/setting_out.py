@@ -38,8 +38,10 @@ FALLS, RUNS, HOW_FAST, HOW_LONG, STAYS_DOWN = range(8, 13)
 """Indices of a walk's draws: whether to fall or run, speed, time to lie, whether to stay down."""
 ARRIVED_M = 0.12
 """Distance to a place within which a worker has arrived [m]."""
-HURRY = (1.0, 0.75)
+PACE_FACTORS = (1.0, 0.75)
 """Factors of the walking speed that are tried in turn."""
+DETOUR_RESERVE_M = 0.1
+"""Distance added to `APART_M` for the radius of a detour around another worker [m]."""
 STAY_DOWN_S = (15.0, 40.0)
 """Range of the time on the floor of a worker that stays down [s]; judgement."""
 STUMBLE_TO = ("robot", "open", "floor")
@@ -69,38 +71,47 @@ def set_out(decision: Decision) -> Action | None:
 
 
 def _set_out_to(decision: Decision, places: Iterable[Place], kind: int) -> Action | None:
-    """Begin to walk to the first place with a free path.
+    """Begin to walk to the first place that can be reached without meeting another worker.
+
+    For each place, paths at the speeds of `PACE_FACTORS` are tried in turn. The position at which
+    one path meets another worker becomes an obstacle for the next path to the same place.
 
     Args:
-        decision: inputs of the decision.
+        decision: inputs of the decision; if a place is reachable, the worker's errand is set.
         places: places in the order in which they are tried.
         kind: kind of the places, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
+
+    Returns:
+        The activity that begins, or None if no place can be reached. In this case the worker's
+        plan is cancelled.
     """
-    mind, worker = decision.mind, decision.worker
+    config, worker = decision.mind.config, decision.worker
     for place in places:
         obstacles = list_obstacles(decision)
-        for share in HURRY:
-            action = _plan_way(decision, place, obstacles, share, kind != ON_STAGE)
+        for pace_factor in PACE_FACTORS:
+            # A plan is written to the worker's record, from which meetings are predicted.
+            action = _plan_way(decision, place, obstacles, pace_factor, to_work=kind != ON_STAGE)
             if action is None:
-                break
+                break  # There is no path at any pace.
             meeting = check_traffic(decision, action)
-            if meeting.time_s < 0.0:
+            if meeting.time_s < 0.0:  # The path meets no other worker.
                 worker.place[:] = place
                 worker.place_kind = kind
-                dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-                worker.stay_until_s = decision.clock_s + action.duration_s + dwell
+                dwell_s = decision.draw(DWELL, config.dwell_s) * config.people.tempo
+                worker.stay_until_s = decision.clock_s + action.duration_s + dwell_s
                 decision.set_travel(UNDER_WAY)
                 if action.activity == st.PUSH:
-                    _take_wheels(decision)
+                    _take_cart(decision)
                 return action
-            obstacles = np.vstack([obstacles, (meeting.x, meeting.y, APART_M + 0.1)])
+            detour = (meeting.x, meeting.y, APART_M + DETOUR_RESERVE_M)
+            obstacles = np.vstack([obstacles, detour])
             cancel_plan(decision)
     cancel_plan(decision)
     return None
 
 
 def _plan_way(
-    decision: Decision, place: Place, obstacles: Floats, share: float, to_work: bool
+    decision: Decision, place: Place, obstacles: Floats, pace_factor: float, to_work: bool
 ) -> Action | None:
     """Plan to go to a place; return None if there is no path.
 
@@ -108,7 +119,7 @@ def _plan_way(
         decision: inputs of the decision.
         place: goal of the path.
         obstacles: discs (n, 3) that the path must avoid: x, y, radius [m].
-        share: factor of the worker's walking speed.
+        pace_factor: factor of the worker's walking speed.
         to_work: whether the worker has a job to do at the place.
     """
     mind, job, worker = decision.mind, decision.job, decision.worker
@@ -117,7 +128,7 @@ def _plan_way(
     bow = 2.0 * decision.draws.item(BOW) - 1.0
     if not find_route(start, end, bow, obstacles, mind.plan.grid, worker):
         return None
-    pace = share * float(worker.speed_m_s)
+    pace = pace_factor * float(worker.speed_m_s)
     free = not decision.is_loaded and job.by == "walk"
     if free and (action := _plan_fall_or_run(decision, place.yaw, pace)):
         return action
@@ -125,7 +136,7 @@ def _plan_way(
     stumbles = decision.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if decision.is_loaded:
         activity = st.CARRY
-    elif to_work and job.by == "push" and _has_wheels(decision):
+    elif to_work and job.by == "push" and _has_cart(decision):
         activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
     elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
@@ -133,14 +144,14 @@ def _plan_way(
     return Action(activity, duration_s)
 
 
-def _has_wheels(decision: Decision) -> bool:
+def _has_cart(decision: Decision) -> bool:
     """Return whether the cart to be pushed is within reach, or the scene has no such cart."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     return row >= 0 or not lying.has_load(decision.loads, kind)
 
 
-def _take_wheels(decision: Decision) -> None:
+def _take_cart(decision: Decision) -> None:
     """Remove the cart that the worker will push from the loads at rest."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)

@@ -37,7 +37,7 @@ class Meeting(NamedTuple):
     """The first moment at which a worker comes too close to another."""
 
     time_s: float
-    """Time from now [s]; -1 for never."""
+    """Time from now [s]; negative (-1) if there is no such moment."""
     x: float
     """World x of the other worker's root at that time [m]."""
     y: float

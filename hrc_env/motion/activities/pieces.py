@@ -95,12 +95,12 @@ class Clips:
 
 
 class _Piece(NamedTuple):
-    """A part of a clip."""
+    """A range of frames of a clip."""
 
     first: int
-    """First frame."""
+    """Index of the first frame."""
     last: int
-    """Last frame."""
+    """Index of the last frame, which belongs to the piece."""
     starts: Floats
     """Poses (k, 3) as in `Clips.starts`."""
 
@@ -119,7 +119,9 @@ def make_stage(plan: Floorplan, config: MotionConfig) -> Stage:
 
 
 def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
-    """Cut clips into pieces.
+    """Cut clips into pieces that begin and end with both feet on the floor.
+
+    All bodies have the same pieces, each of which has room on the floor for every body.
 
     Args:
         clips: recorded motion.
@@ -127,28 +129,36 @@ def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
         stage: floor and starting poses.
 
     Returns:
-        The pieces, scaled to each body.
+        The n pieces, in the order of the clips, with N frames together. `Clips.frames` holds the
+        N frames of all pieces scaled to the first body, then those scaled to the second body, and
+        so on: piece i of body b begins at row b N + `Clips.row[i]`.
 
     Raises:
-        NoRoomError: no part of a clip fits at any of the starting poses.
-        ConfigError: a clip has no two moments with both feet on the floor.
+        NoRoomError: a clip has no piece that fits at any of the starting poses.
+        ConfigError: a clip does not have two frames with both feet on the floor at least
+            `SHORTEST_S` apart.
     """
-    bodies = [[scale_clip(clip, row) for row in lengths] for clip in clips]
-    cut = [_cut_clip(clip, scaled, stage) for clip, scaled in zip(clips, bodies, strict=True)]
-    pieces = [piece for parts in cut for piece in parts]
-    frames = [np.zeros((0, len(RECORDED)))]
+    scaled_clips = [[scale_clip(clip, size) for size in lengths] for clip in clips]
+    pieces_of_clips = [
+        _cut_clip(clip, scaled, stage) for clip, scaled in zip(clips, scaled_clips, strict=True)
+    ]
+    pieces, fps = list[_Piece](), list[float]()
+    for clip, pieces_of_clip in zip(clips, pieces_of_clips, strict=True):
+        pieces += pieces_of_clip
+        fps += [clip.fps] * len(pieces_of_clip)
+    frames = [np.zeros((0, len(RECORDED)))]  # This entry sets the width if there are no clips.
     for body in range(len(lengths)):
-        for scaled, parts in zip(bodies, cut, strict=True):
-            for first, last, _ in parts:
-                frames.append(move_to_origin(scaled[body][first : last + 1])[:, RECORDED])
-    count = np.array([last - first + 1 for first, last, _ in pieces], np.int64)
-    rates = [clip.fps for clip, parts in zip(clips, cut, strict=True) for _ in parts]
+        for scaled, pieces_of_clip in zip(scaled_clips, pieces_of_clips, strict=True):
+            for piece in pieces_of_clip:
+                controls = move_to_origin(scaled[body][piece.first : piece.last + 1])
+                frames.append(controls[:, RECORDED])
+    count = np.array([piece.last - piece.first + 1 for piece in pieces], np.int64)
     return Clips(
-        np.ascontiguousarray(np.concatenate(frames)),
-        np.cumsum(count) - count,
-        count,
-        np.array(rates),
-        tuple(piece.starts for piece in pieces),
+        frames=np.ascontiguousarray(np.concatenate(frames)),
+        row=np.cumsum(count) - count,
+        count=count,
+        fps=np.array(fps),
+        starts=tuple(piece.starts for piece in pieces),
     )
 
 
