@@ -18,7 +18,10 @@ CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis i
 COMMENTS = "#|//"
 """Regular expression of the signs that begin a comment."""
 LEAST_SHARE = 0.5
-"""Least share of the announced number of frames that a file must contain; judgement."""
+"""Least fraction of the announced number of frames that a file must contain.
+
+The value is an estimate.
+"""
 LIMB = 4
 """Least number of nodes, including the tip, in the chain of a leg or of a trunk with an arm."""
 NEAR_ZERO = 0.5

@@ -11,7 +11,7 @@ from hrc_env.mocap.person import Run, find_runs, smooth
 from hrc_env.mocap.record import Repaired
 
 ANKLE_M = 0.06
-"""Height of the ankle above the tip of a standing foot [m], from the baked bodies."""
+"""Height of the ankle above the tip of a standing foot [m], from the worker models."""
 RESTS_M_S = 0.15
 """Vertical speed of the lower foot below which it is at rest [m/s].
 
@@ -44,11 +44,11 @@ HAND_M = 0.1
 RUN_M_S = 2.5
 """Speed of a person above which feet need not be at rest [m/s]."""
 LEAST_SHARE = 0.1
-"""Least share of the time in which at least one foot is at rest."""
+"""Least fraction of the time in which at least one foot is at rest."""
 FLOOR_M = (-0.03, 0.09)
 """Range of the height of standing feet's tips for which the file's floor is accepted [m]."""
 SOLE_M = 0.03
-"""Height of feet's tips above an estimated floor [m]; 0.01 to 0.04 for the baked bodies."""
+"""Height of feet's tips above an estimated floor [m]; 0.01 to 0.04 for the worker models."""
 ACCEPT = "To play it all the same, as on one floor: --allow-off-floor (allow_off_floor=True)."
 
 

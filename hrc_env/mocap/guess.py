@@ -12,7 +12,7 @@ from hrc_env.motion.anatomy import GRIP_M
 HEADING_S = 0.25
 """Standard deviation of the smoothing of the pelvis's direction for the heading [s]."""
 PELVIS_SHARE = 0.45
-"""Share of the pelvis in the pitch of the trunk, as in `posture.lean`."""
+"""Fraction of the pelvis in the pitch of the trunk, as in `posture.lean`."""
 VERTICAL_SHARE = 0.2
 """Horizontal extent of a foot, relative to its length, below which it heads like the pelvis."""
 NOSE_PITCH_RAD = 0.6

@@ -10,7 +10,7 @@ from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 
 MEASURED_SHARE = 0.755
-"""Total length of shank, thigh and trunk as a share of stature, from the baked bodies."""
+"""Total length of shank, thigh and trunk as a fraction of stature, from the worker models."""
 STRANGE = 2.0
 """Ratio of a bone's length to that of an adult of equal stature beyond which it is an error."""
 

@@ -30,7 +30,10 @@ UNITS: dict[str, float] = {
 }
 """Units of length in files [m]; the unit is inferred from the person's stature."""
 LONGEST_GAP_S = 0.25
-"""Longest time for which a joint may be missing [s]: about half a step; judgement."""
+"""Longest time for which a joint may be missing [s]: about half a step.
+
+The value is an estimate.
+"""
 STEADY = 0.8
 """Least component of the mean direction from ankles to shoulders along the upward axis."""
 STRAIGHT = 0.9
@@ -40,11 +43,11 @@ UPRIGHT_SHARE = 0.5
 BEGIN = 5
 """Number of initial frames that are averaged, and least number of standing or upright frames."""
 ON_FLOOR = 0.15
-"""Greatest ankle height of a person on the file's floor, as a share of stature."""
+"""Greatest ankle height of a person on the file's floor, as a fraction of stature."""
 OFF_FLOOR = 0.25
-"""Least ankle height of a person off the file's floor, as a share of stature."""
+"""Least ankle height of a person off the file's floor, as a fraction of stature."""
 KNEES = 0.1
-"""Greatest mean bend of the knees for straight legs, as a share of a shank."""
+"""Greatest mean bend of the knees for straight legs, as a fraction of a shank."""
 JUMP = 6.0
 """Ratio of the first frame's jump to later ones above which the first frame is a rest pose."""
 AFTER = 6
@@ -225,9 +228,9 @@ class _Forward(NamedTuple):
     """Forward components of feet and knees; they are negative for the mirror image of a person."""
 
     feet: float
-    """Median forward component of the feet, as a share of their length."""
+    """Median forward component of the feet, as a fraction of their length."""
     knees: float
-    """Mean forward bend of the knees, as a share of a shank."""
+    """Mean forward bend of the knees, as a fraction of a shank."""
 
 
 def _measure_forward(joints: Points3) -> _Forward:

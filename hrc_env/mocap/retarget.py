@@ -27,7 +27,7 @@ STILL_M_S = 0.15
 LOW_SHARE = 40.0
 """Percentile of an ankle's heights below which it may stand."""
 OnProgress: TypeAlias = Callable[[float], None]
-"""Callback that receives each increase of the completed share of the work."""
+"""Callback that receives each increase of the completed fraction of the work."""
 ROUNDS = 12
 """Number of iterations of the fit; after eight it changes by less than a millimetre."""
 FRAMES = 256
@@ -114,7 +114,7 @@ def retarget(
     Args:
         capture: recording, from `read_recording`.
         body: body or name of a worker; other workers can play the clip, too, scaled to their size.
-        on_progress: called with each increase of the completed share of the work.
+        on_progress: called with each increase of the completed fraction of the work.
 
     Returns:
         The clip, and the distances between the worker's joints and the recorded ones [m].
@@ -243,7 +243,7 @@ def fit_controls(
         joints: desired joints (T, 15, 3) of the worker [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
-        on_progress: called with each increase of the completed share of the work.
+        on_progress: called with each increase of the completed fraction of the work.
     """
     q = guess_controls(joints, fps, marks)
     weight = np.array([WEIGHT[joint.split("_")[-1]] for joint in JOINTS])[:, None]

@@ -25,7 +25,7 @@ CHAINS = tuple(
 CHOICES = 6
 """Number of candidate nodes for a joint, the best by name."""
 NOSE_SHARE = 0.065
-"""Distance of the nose ahead of the head's joint, as a share of stature of the baked bodies."""
+"""Distance of the nose ahead of the head's joint, as a fraction of stature of the worker models."""
 STANDS = -0.7
 """Cosine of the angle between trunk and thighs below which a rest pose is a standing pose."""
 

@@ -19,32 +19,32 @@ VERSION = 1
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
 """Columns (32,) of the control vector that a recording fills: the blended ones and the feet."""
 SLOWEST_HZ = 5.0
-"""Lowest plausible frame rate [Hz]; judgement."""
+"""Lowest plausible frame rate [Hz]. The value is an estimate."""
 FASTEST_HZ = 1000.0
-"""Highest plausible frame rate [Hz]; judgement."""
+"""Highest plausible frame rate [Hz]. The value is an estimate."""
 FARTHEST_M = 200.0
-"""Greatest plausible distance of the root from the origin [m]; judgement."""
+"""Greatest plausible distance of the root from the origin [m]. The value is an estimate."""
 FASTEST_M_S = 15.0
-"""Greatest plausible speed of the root [m/s]; judgement."""
+"""Greatest plausible speed of the root [m/s]. The value is an estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Recorded motion of a worker; it begins at the origin, with the worker facing +x."""
+    """Recorded motion that can be played by workers; it begins at the origin, facing +x."""
 
     controls: Floats
     """Control vectors (T, N_CONTROLS), see `controls`; columns outside of `RECORDED` are zero."""
     fps: float
     """Frame rate [Hz]."""
     contacts: Bools
-    """Mask (T, 2) of whether the left and the right foot stand on the floor."""
+    """Mask (T, 2) of the frames in which the left and the right foot stand on the floor."""
     size: Floats
     """Body dimensions (N_SIZES,) of the worker for this motion [m], see `Anatomy.lengths`."""
     source: str
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        """Check shapes, and that values are finite and speeds plausible for a person."""
+        """Check that shapes are correct, values finite, and speeds plausible for a person."""
         q, source = self.controls, self.source
         check_rate(self.fps, source)
         if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
@@ -87,7 +87,7 @@ def move_to_origin(controls: Floats) -> Floats:
 def scale_clip(clip: Clip, size: Floats) -> Floats:
     """Return the control vectors (T, N_CONTROLS) for a worker of dimensions (N_SIZES,) [m].
 
-    Paths scale with the length of the legs, the reach of the hands with that of the arms.
+    Paths scale with the length of the legs, and the reach of the hands with that of the arms.
     """
     out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
     out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
@@ -152,7 +152,7 @@ def find_footprints(feet: Floats, size: Floats) -> Floats:
     """Return the ankle position and heading (T, 4) that a foot would have if it were flat.
 
     Args:
-        feet: ankle position (3) [m], heading and pitch [rad] of a foot, (T, 5 or more).
+        feet: pose (T, 5 or more) of a foot: ankle position (3) [m], heading and pitch [rad].
         size: dimensions (N_SIZES,) of the body [m].
     """
     flat = feet[:, :3] - shift_by_roll(feet[:, 3], feet[:, 4], size)
@@ -163,8 +163,8 @@ def shift_by_roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
     """Return the displacement (T, 3) of an ankle due to the pitch of its foot [m].
 
     Args:
-        yaw: heading of the foot (T,) [rad].
-        pitch: pitch about the ball if positive, else about the heel (T,) [rad].
+        yaw: heading (T,) of the foot [rad].
+        pitch: pitch (T,) of the foot [rad], about the ball if positive, else about the heel.
         size: dimensions (N_SIZES,) of the body [m].
     """
     ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])

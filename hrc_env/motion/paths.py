@@ -16,9 +16,9 @@ from hrc_env.motion.state import MAX_VIA, Worker
 HEADING_WINDOW_M = 0.3
 """Half width of the window over which the direction is averaged (Grasso et al. 1998) [m]."""
 OWN_EDGE = 0.9
-"""Greatest share of the first or last edge that the arc of a corner occupies."""
+"""Greatest fraction of the first or last edge that the arc of a corner occupies."""
 SHARED_EDGE = 0.5
-"""Greatest share of an edge between two corners that the arc of either corner occupies."""
+"""Greatest fraction of an edge between two corners that the arc of either corner occupies."""
 
 
 @kernel

@@ -12,27 +12,30 @@ from hrc_env.motion.points import Point, Sides
 from hrc_env.motion.state import Worker
 
 STANCE_HALF_WIDTH_M = 0.10
-"""Half the distance between the ankles in standing [m]; shoulder width of the baked bodies."""
+"""Half the distance between the ankles in standing [m]; shoulder width of the worker models."""
 TOE_OUT_RAD = 0.12
 """Outward turn of the feet in standing and walking [rad]; about 7 degrees."""
 SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
-"""Incommensurable frequencies of a standing person's sway [Hz]; judgement."""
+"""Incommensurable frequencies of a standing person's sway [Hz]. The values are estimates."""
 SHIFT_M = 0.018
-"""Amplitude of the lateral weight shift [m]; judgement."""
+"""Amplitude of the lateral weight shift [m]. The value is an estimate."""
 RELAXED_PITCH = 0.02
-"""Forward rotation of a hanging upper arm [rad]; judgement."""
+"""Forward rotation of a hanging upper arm [rad]. The value is an estimate."""
 RELAXED_ELBOW = 0.38
-"""Bend of the elbow of a hanging arm [rad]; judgement."""
+"""Bend of the elbow of a hanging arm [rad]. The value is an estimate."""
 RELAXED_OUT = 0.26
-"""Abduction of a hanging upper arm from the trunk [rad]; judgement."""
+"""Abduction of a hanging upper arm from the trunk [rad]. The value is an estimate."""
 HAND_OUT_M = 0.05
-"""Lateral distance of a hanging hand from its elbow [m], to clear broad hips; judgement."""
+"""Lateral distance of a hanging hand from its elbow [m], to clear broad hips.
+
+The value is an estimate.
+"""
 MOST_LEAN = 1.3
 """Greatest lean; a person would take a step instead of leaning further."""
 NECK_SHARE = 0.70
-"""Height of the eyes above the pelvis as a share of pelvis height, from the baked bodies."""
+"""Height of the eyes above the pelvis as a fraction of pelvis height, from the worker models."""
 HEAD_SHARE = 0.75
-"""Share of the head in a gaze shift besides the eyes (Freedman & Sparks 1997: 70-80 %)."""
+"""Fraction of the head in a gaze shift besides the eyes (Freedman & Sparks 1997: 70-80 %)."""
 MOST_YAW_RAD = 1.2
 """Greatest yaw of the head relative to the chest [rad]; comfortable range, judgement."""
 MOST_DOWN_RAD = 0.75
@@ -118,7 +121,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
 
     Args:
         amount: lean; 1 is a deep bow.
-        squat: share of the lean that is achieved by bending the knees.
+        squat: fraction of the lean that is achieved by bending the knees.
         twist: twist of the trunk to the left [rad].
         worker: record of the worker; its `q` is changed.
     """
@@ -196,7 +199,7 @@ def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
         x: world x of the point [m].
         y: world y of the point [m].
         z: world z of the point [m].
-        share: share of the full turn.
+        share: fraction of the full turn.
         worker: record of the worker; its `q` is changed.
     """
     q = worker.q

@@ -21,17 +21,32 @@ from hrc_env.motion.walk import brake
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments near which workers notice the robot."""
 MEETS_M = 0.20
-"""Greatest distance by which a hand adapts to the position of an offered tool [m]; judgement."""
+"""Greatest distance by which a hand adapts to the position of an offered tool [m].
+
+The value is an estimate.
+"""
 MEETS_M_S = 0.30
-"""Speed at which a hand adapts to the position of an offered tool [m/s]; judgement."""
+"""Speed at which a hand adapts to the position of an offered tool [m/s].
+
+The value is an estimate.
+"""
 WAITS_SHARE = 0.4
-"""Share of bending down after which a worker no longer waits for the robot; judgement."""
+"""Fraction of bending down after which a worker no longer waits for the robot.
+
+The value is an estimate.
+"""
 WITHDRAW = -1.6
 """Pace of the activity's clock while hands are withdrawn."""
 MACHINE_S = 2.0
-"""Time horizon over which walkers predict the motion of a mobile robot [s]; judgement."""
+"""Time horizon over which walkers predict the motion of a mobile robot [s].
+
+The value is an estimate.
+"""
 MACHINE_CALM_S = 0.4
-"""Time after a reaction to a mobile robot without another reaction [s]; judgement."""
+"""Time after a reaction to a mobile robot without another reaction [s].
+
+The value is an estimate.
+"""
 
 
 class NoticeParams(NamedTuple):

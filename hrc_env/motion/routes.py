@@ -28,7 +28,7 @@ WALKED_M = -0.02
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
 """Distances before a corner at which its arc may begin, tried in turn [m]."""
 BOW_SHARE = 0.12
-"""Lateral bow of a free path as a share of its length, because people do not walk straight."""
+"""Lateral bow of a free path as a fraction of its length, because people do not walk straight."""
 
 
 class Ground(NamedTuple):

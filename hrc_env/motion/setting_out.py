@@ -43,7 +43,7 @@ PACE_FACTORS = (1.0, 0.75)
 DETOUR_RESERVE_M = 0.1
 """Distance added to `APART_M` for the radius of a detour around another worker [m]."""
 STAY_DOWN_S = (15.0, 40.0)
-"""Range of the time on the floor of a worker that stays down [s]; judgement."""
+"""Range of the time on the floor of a worker that stays down [s]. The values are estimates."""
 STUMBLE_TO = ("robot", "open", "floor")
 """Kinds of places that have room ahead for the arms of a stumbling worker."""
 

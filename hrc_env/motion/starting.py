@@ -39,7 +39,7 @@ def start_going(
 
     Args:
         activity: index into `ACTIVITY_NAMES`.
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         end_yaw: heading at the end [rad].
         pace_m_s: walking speed [m/s].
         prop: cart that is pushed, an index into `PROPS`.
@@ -60,7 +60,7 @@ def start_take(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to hold out a hand for a tool that the robot offers.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the hand [m].
         worker: record into which the plan is written.
 
@@ -189,7 +189,7 @@ def _draw_target(
     """Draw a random target of the hands, in the world [m].
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
         height: least height of a target ahead [m].
@@ -216,7 +216,7 @@ def start_reach(
     """Plan a random reach: its target, hands, speed and duration.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
         height: least height of a target ahead [m].
@@ -247,7 +247,7 @@ def start_lift(draws: Floats, params: HandParams, worker: Worker) -> float:
     """Plan a random lift: the load's position, and the times to bend, raise and hold.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of lifts.
         worker: record into which the plan is written.
 

@@ -35,7 +35,7 @@ SLOWEST_M_S = 0.65
 LEG_M = 0.8685772217237624
 """Leg length at which the fit holds [m]; step periods scale with the square root of leg length."""
 SWING_SHARE = 0.80
-"""Swing time as a share of the period of a step, at 1 m/s."""
+"""Swing time as a fraction of the period of a step, at 1 m/s."""
 SWING_FAST_SHARE = 0.02
 """Increase of `SWING_SHARE` from 1 m/s to `FASTEST_M_S`."""
 FASTEST_M_S = 1.8
@@ -45,7 +45,10 @@ MID_STANCE = 0.46
 EARLIER = 0.31
 """Time by which runners pass over a footprint before walkers would, in periods of a step."""
 RUN_WIDER_M = 0.015
-"""Increase of half the step width in a run [m], so that a heel clears the shank; judgement."""
+"""Increase of half the step width in a run [m], so that a heel clears the shank.
+
+The value is an estimate.
+"""
 WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; measured widths are 5 to 9 cm."""
 SHIFT_S = 0.28
@@ -55,9 +58,12 @@ TURN_S = 0.5
 TURN_RATE = 1.7
 """Angular speed by which the duration of a turn grows with its angle [rad/s]."""
 SIDE_STEP_M = 0.5
-"""Path length up to which people take small steps instead of turning [m]; judgement."""
+"""Path length up to which people take small steps instead of turning [m].
+
+The value is an estimate.
+"""
 CORNER_M_S2 = 1.6
-"""Greatest lateral acceleration in a corner [m/s^2]; judgement."""
+"""Greatest lateral acceleration in a corner [m/s^2]. The value is an estimate."""
 NORMAL_M_S = 1.3
 """Speed at which the pace is 1, for which the amplitudes below are stated [m/s]."""
 BOB_M = 0.0095
@@ -65,9 +71,12 @@ BOB_M = 0.0095
 BOB_PACE_M = 0.0035
 """Increase of the amplitude of the pelvis's vertical motion per unit of pace [m]."""
 BENT_M = 0.026
-"""Lowering of the pelvis from its standing height per unit of pace [m]; judgement."""
+"""Lowering of the pelvis from its standing height per unit of pace [m].
+
+The value is an estimate.
+"""
 BENT_FAST_M = 0.10
-"""Lowering of the pelvis with the square of the pace above 1 [m]; judgement."""
+"""Lowering of the pelvis with the square of the pace above 1 [m]. The value is an estimate."""
 SWING_SLOW_RAD = 0.05
 """Amplitude of the upper arm's swing at any pace [rad]."""
 SWING_FAST_RAD = 0.104
@@ -75,11 +84,11 @@ SWING_FAST_RAD = 0.104
 FULL_SWING = 1.1
 """Pace beyond which the arm swing does not grow."""
 ELBOW_SWING = 0.73
-"""Bend of the elbow as a share of the arm swing."""
+"""Bend of the elbow as a fraction of the arm swing."""
 LOADED_TWIST = 0.4
-"""Share of the trunk's twist that remains with a load."""
+"""Fraction of the trunk's twist that remains with a load."""
 LURCH_S = 1.4
-"""Duration of a stumble [s]; judgement."""
+"""Duration of a stumble [s]. The value is an estimate."""
 
 
 class Pace(NamedTuple):
@@ -94,7 +103,7 @@ class Pace(NamedTuple):
 
 
 SIDE_STEP_PACE = Pace(0.0, 0.2, 0.52)
-"""Pace of side steps; judgement."""
+"""Pace of side steps. The value is an estimate."""
 
 
 @kernel

@@ -18,13 +18,13 @@ FIRST_M = 0.40
 TREAD_M = 0.24
 """Distance from tread to tread [m]."""
 STEP_AT_S = 0.12
-"""Time at which a climber's first foot lifts off [s]; judgement."""
+"""Time at which a climber's first foot lifts off [s]. The value is an estimate."""
 PERIOD_S = 0.72
-"""Period of a climber's steps [s]; judgement."""
+"""Period of a climber's steps [s]. The value is an estimate."""
 SWING_S = 0.56
-"""Swing time of a climber's foot [s]; judgement."""
+"""Swing time of a climber's foot [s]. The value is an estimate."""
 TURN_S = 0.75
-"""Time to turn the head from one side to the other [s]; judgement."""
+"""Time to turn the head from one side to the other [s]. The value is an estimate."""
 
 
 @kernel
@@ -55,8 +55,8 @@ def start_climb(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to climb to a height and come down again.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height to climb to [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height to climb to [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -98,7 +98,7 @@ def start_look_round(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to look to both sides; the height has no effect.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the work [m].
         worker: record into which the plan is written.
 

@@ -25,7 +25,7 @@ CART_AHEAD_M = 0.47
 WHEELBARROW_AHEAD_LEGS = 0.26
 """Distance of a level wheelbarrow's handles ahead of the root, in leg lengths."""
 PUSHING_SHARE = 0.99
-"""Extension of the arms in pushing, as a share of their length."""
+"""Extension of the arms in pushing, as a fraction of their length."""
 STOOPED_M = 0.4
 """Forward displacement of the shoulders at a lean of 1 [m]."""
 CART_LEAN = 0.06
@@ -37,19 +37,22 @@ WHEEL_UP_M = 0.17
 STANDS_RAD = 0.2
 """Pitch of a wheelbarrow that stands on its legs [rad]."""
 KNUCKLES_SHARE = 0.97
-"""Height of a wheelbarrow's raised handles as a share of pelvis height."""
+"""Height of a wheelbarrow's raised handles as a fraction of pelvis height."""
 BEND = 1.3
-"""Lean to grasp the handles of a wheelbarrow; judgement."""
+"""Lean to grasp the handles of a wheelbarrow. The value is an estimate."""
 TAKE_S = 0.7
 """Time for the hands to reach the handles [s]."""
 LIFT_S = 0.5
 """Time to lift a wheelbarrow by its handles [s]."""
 STEP_BACK_PACE = Pace(0.0, 0.62, 0.42)
-"""Pace of quick steps back; judgement."""
+"""Pace of quick steps back. The value is an estimate."""
 TURN_PACE = Pace(0.0, 0.2, 0.36)
-"""Pace of turning on the spot, slow enough that the feet do not collide; judgement."""
+"""Pace of turning on the spot, slow enough that the feet do not collide.
+
+The value is an estimate.
+"""
 CAUGHT_LEGS = 0.115
-"""Shortening of the step in which a foot is caught, in leg lengths; judgement."""
+"""Shortening of the step in which a foot is caught, in leg lengths. The value is an estimate."""
 
 
 @kernel(makes_arrays=True)
@@ -65,7 +68,7 @@ def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to step straight back without looking; the height has no effect.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the work [m].
         worker: record into which the plan is written.
 
@@ -83,7 +86,7 @@ def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, worker: Worke
     """Plan a walk along the worker's path in which a foot is caught.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         end_yaw: heading at the end [rad].
         speed_m_s: top speed [m/s].
         worker: record with the path; the plan is written into it.

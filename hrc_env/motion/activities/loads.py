@@ -24,32 +24,38 @@ from hrc_env.world import AWAY_M
 BOX = PROP_NAMES.index("box")
 BOARD = PROP_NAMES.index("board")
 BOX_AHEAD_M = 0.37
-"""Distance of a held box ahead of the root [m]; judgement."""
+"""Distance of a held box ahead of the root [m]. The value is an estimate."""
 BOX_HEIGHT = 1.10
-"""Height of a held box as a multiple of pelvis height; judgement."""
+"""Height of a held box as a multiple of pelvis height. The value is an estimate."""
 BOARD_AHEAD_M = 0.27
-"""Distance of a held board ahead of the root [m]; judgement."""
+"""Distance of a held board ahead of the root [m]. The value is an estimate."""
 BOARD_HEIGHT = 0.96
-"""Height of a held board as a multiple of pelvis height; judgement."""
+"""Height of a held board as a multiple of pelvis height. The value is an estimate."""
 GIVEN_AHEAD_M = 0.60
-"""Distance ahead of the root of a load that is handed over [m]; judgement."""
+"""Distance ahead of the root of a load that is handed over [m]. The value is an estimate."""
 GIVEN_HEIGHT = 1.14
-"""Height of a load that is handed over, as a multiple of pelvis height; judgement."""
+"""Height of a load that is handed over, as a multiple of pelvis height.
+
+The value is an estimate.
+"""
 CARRYING_SHARE = 0.95
-"""Greatest extension of carrying arms, as a share of their length; judgement.
+"""Greatest extension of carrying arms, as a fraction of their length; judgement.
 
 The rest is a reserve for the swinging trunk.
 """
 ON_SHOULDER_M = (0.12, 0.165, 0.075)
 """Position of a board on the shoulder: ahead of and beside the root, above the shoulder [m]."""
 STEADY_M = 0.26
-"""Distance of the steadying hand from the middle of a board on the shoulder [m]; judgement."""
+"""Distance of the steadying hand from the middle of a board on the shoulder [m].
+
+The value is an estimate.
+"""
 NOSE_UP_RAD = 0.08
-"""Pitch of a board on the shoulder, with its front end up [rad]; judgement."""
+"""Pitch of a board on the shoulder, with its front end up [rad]. The value is an estimate."""
 CROUCH_M = 0.15
-"""Height of a load that is gripped in a full squat [m]; judgement."""
+"""Height of a load that is gripped in a full squat [m]. The value is an estimate."""
 BENT_M = 0.45
-"""Height of a load that is gripped by bending the trunk only [m]; judgement."""
+"""Height of a load that is gripped by bending the trunk only [m]. The value is an estimate."""
 GAZE_PAST_M = 0.35
 """Distance beyond the load at which a squatting worker, with the head over it, looks [m]."""
 GRIP_S = 0.3
@@ -99,8 +105,8 @@ def plan_pick_up(
     """Plan to pick up a box or board.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the grips [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the grips [m]; 0 for a random height.
         prop: kind of the load, an index into `PROPS`.
         on_shoulder: whether to carry a board on the shoulder.
         worker: record into which the plan is written.
@@ -119,7 +125,7 @@ def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to receive a box that another person holds out.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the box [m]; 0 for the usual height.
         worker: record into which the plan is written.
 
@@ -137,8 +143,8 @@ def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to set down the load that is held.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the grips at rest [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the grips at rest [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -154,7 +160,7 @@ def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to hold out the load until another person takes it.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the load [m]; 0 for the usual height.
         worker: record into which the plan is written.
 

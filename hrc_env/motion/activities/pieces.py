@@ -26,7 +26,7 @@ LONGEST_S = 20.0
 SHORTEST_S = 0.5
 """Duration of the shortest piece [s]."""
 EDGE_SHARE = 0.15
-"""Share of a piece by which an end may be trimmed, up to `SHORTEST_S`, to end on flat feet."""
+"""Fraction of a piece by which an end may be trimmed, up to `SHORTEST_S`, to end on flat feet."""
 LOW_M = 0.05
 """Greatest height of the higher foot at the beginning and end of a piece [m].
 
@@ -39,11 +39,11 @@ TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
 SPARE_M = 0.05
 """Reserve in the room for a piece, because workers stand slightly off their places [m]."""
 ENOUGH = 0.1
-"""Share of the places at which a piece should have room, if possible."""
+"""Fraction of the places at which a piece should have room, if possible."""
 ROBOT_RADII = np.linspace(0.0, 1.0, 3)
-"""Candidate places at the robot: shares of the range of the radius."""
+"""Candidate places at the robot: fractions of the range of the radius."""
 ROBOT_AZIMUTHS = np.linspace(-1.0, 1.0, 7)
-"""Candidate places at the robot: shares of the range of the azimuth."""
+"""Candidate places at the robot: fractions of the range of the azimuth."""
 
 
 class NoRoomError(ConfigError):
@@ -224,7 +224,7 @@ def _count_room(q: Floats, stage: Stage) -> Ints:
 
 
 def _choose_room(room: Ints, least: int) -> int:
-    """Return the number of frames for which a share `ENOUGH` of the places has room.
+    """Return the number of frames for which a fraction `ENOUGH` of the places has room.
 
     If it is not more than `least`, return the number of frames at the best place.
     """

@@ -22,13 +22,13 @@ from hrc_env.motion.posture import MOST_LEAN, find_farthest, locate_ahead, measu
 from hrc_env.motion.state import Worker
 
 TAKE_S = 0.55
-"""Time to take a tool from the belt [s]; judgement."""
+"""Time to take a tool from the belt [s]. The value is an estimate."""
 STEP_S = 0.9
-"""Time to step into a stance [s]; judgement."""
+"""Time to step into a stance [s]. The value is an estimate."""
 KNEEL_S = 1.5
-"""Time to kneel down on one knee [s]; judgement."""
+"""Time to kneel down on one knee [s]. The value is an estimate."""
 CROUCH_S = 1.1
-"""Time to squat down [s]; judgement."""
+"""Time to squat down [s]. The value is an estimate."""
 KNEEL_STEP_AT_S = 0.15
 """Time of the first lift-off in kneeling down [s]."""
 KNEEL_PERIOD_S = 0.62
@@ -148,7 +148,7 @@ def measure_reach(share: float, one: float, other: float, worker: Worker) -> flo
     """Return the reach of an arm along an axis, given the other coordinates of the target [m].
 
     Args:
-        share: share of the arm's length that is used.
+        share: fraction of the arm's length that is used.
         one: distance of the target along the second axis [m].
         other: distance of the target along the third axis [m].
         worker: record with the body dimensions.

@@ -35,7 +35,7 @@ SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
 END, BEGIN, LAST = 0, 2, 4
 """First of two footprints at the activity's end, the clip's beginning, and the clip's end."""
 STRIDE_SHARE = 0.25
-"""Length of the steps before and after a clip as a share of a full stride."""
+"""Length of the steps before and after a clip as a fraction of a full stride."""
 
 
 def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> float:

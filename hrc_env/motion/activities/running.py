@@ -29,11 +29,17 @@ It is about 0.06 s more than the time between two contacts, because a foot lifts
 ALOFT_FAST = 0.08
 """Increase of `ALOFT_SHARE` for each m/s above `USUAL_M_S`."""
 RUN_M_S2 = 3.0
-"""Mean acceleration at the beginning, and deceleration at the end [m/s^2]; judgement."""
+"""Mean acceleration at the beginning, and deceleration at the end [m/s^2].
+
+The value is an estimate.
+"""
 CORNER_M_S2 = 2.5
-"""Greatest lateral acceleration in corners [m/s^2]; judgement."""
+"""Greatest lateral acceleration in corners [m/s^2]. The value is an estimate."""
 BRAKED_M = 0.3
-"""Path length in addition to that for acceleration and deceleration [m]; judgement."""
+"""Path length in addition to that for acceleration and deceleration [m].
+
+The value is an estimate.
+"""
 BOB_M = 0.036
 """Amplitude of the pelvis's vertical motion [m]; measured: 7 to 9 cm peak to peak."""
 LOWER_M = 0.085
@@ -47,9 +53,9 @@ ARM_RAD = 0.52
 ELBOW_RAD = 1.45
 """Bend of the elbow [rad]."""
 ELBOW_SWING = 0.35
-"""Additional bend of the elbow as a share of the arm swing."""
+"""Additional bend of the elbow as a fraction of the arm swing."""
 NECK = 0.7
-"""Share of the lean that the neck compensates."""
+"""Fraction of the lean that the neck compensates."""
 
 
 @kernel

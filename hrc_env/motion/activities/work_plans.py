@@ -22,9 +22,12 @@ DRILL = PROP_NAMES.index("drill")
 HAND_SAW = PROP_NAMES.index("saw")
 TAPE = PROP_NAMES.index("tape_measure")
 _SCREW_STEP_M = 0.12
-"""Forward step of the foot opposite to the drill when driving screws [m]; judgement."""
+"""Forward step of the foot opposite to the drill when driving screws [m].
+
+The value is an estimate.
+"""
 _SCREW_S = (1.0, 1.3)
-"""Range of the time to drive one screw [s]; judgement."""
+"""Range of the time to drive one screw [s]. The values are estimates."""
 _GAZE_M = 0.18
 """Distance of the gaze point ahead of the fist, and to its right, when driving screws [m]."""
 _GAZE_DOWN_M = 0.2
@@ -36,11 +39,11 @@ HEAD_M = 0.25
 FACE_M = 0.05
 """Distance from the handle to the hammer's striking face [m], see `props`."""
 LIGHT_HZ = 5.6
-"""Frequency of light taps [Hz]; their speed is at most 1.1 m/s; judgement."""
+"""Frequency of light taps [Hz]; their speed is at most 1.1 m/s. The value is an estimate."""
 LIGHT_M = 0.060
-"""Peak-to-peak size of light taps [m]; judgement."""
+"""Peak-to-peak size of light taps [m]. The value is an estimate."""
 LOW_SHARE = 0.7
-"""Size of low blows relative to other blows; judgement."""
+"""Size of low blows relative to other blows. The value is an estimate."""
 WALL_M = 1.2
 """Height above which nails are driven into a wall instead of downwards [m]."""
 OVERHEAD_M = 1.7
@@ -62,17 +65,20 @@ FIST_LEFT_M = 0.127
 ASKEW_RAD = -0.25 * math.pi
 """Yaw of the drill from the heading when driving screws into the robot's workpiece [rad]."""
 CUT_RAD = 0.6
-"""Pitch of the saw blade [rad]; 45 to 60 degrees to the board are usual; judgement."""
+"""Pitch of the saw blade [rad]; 45 to 60 degrees to the board are usual.
+
+The value is an estimate.
+"""
 SHOULDER_SHARE = 1.50
 """Height of the shoulder as a multiple of pelvis height."""
 SHOULDER_M = 0.19
 """Lateral distance of the shoulder from the body's midline [m]."""
 POINT_M_S = 1.5
-"""Peak speed of a pointing hand [m/s]; judgement."""
+"""Peak speed of a pointing hand [m/s]. The value is an estimate."""
 NEAREST_ARMS = 1.2
-"""Least distance of the target of a lunge, in arm lengths; judgement."""
+"""Least distance of the target of a lunge, in arm lengths. The value is an estimate."""
 FARTHEST_ARMS = 1.5
-"""Greatest distance of the target of a lunge, in arm lengths; judgement."""
+"""Greatest distance of the target of a lunge, in arm lengths. The value is an estimate."""
 
 
 @kernel
@@ -80,8 +86,8 @@ def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to drive nails with a hammer.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -118,8 +124,8 @@ def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to drill holes, at a wall or overhead.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -154,7 +160,7 @@ def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
     Positions are relative to the initial position and heading: ahead, left, height [m].
 
     Args:
-        draws: (N_START,) uniform draws in [0, 1): 0 the hand, 2 the time for a screw.
+        draws: (N_START,) uniform random numbers in [0, 1): 0 the hand, 2 the time for a screw.
         height: height of the first screw [m].
         worker: record into which the plan is written.
 
@@ -187,8 +193,8 @@ def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to saw a board.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -214,8 +220,8 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to measure with a tape measure.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -238,7 +244,7 @@ def plan_point(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to point in a random direction ahead; the height has no effect.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the work [m].
         worker: record into which the plan is written.
 
@@ -268,8 +274,8 @@ def plan_lunge(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to lunge at a point ahead with one hand.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -295,8 +301,8 @@ def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to kneel and work near the floor.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -312,8 +318,8 @@ def plan_squat(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to squat and work near the floor.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -330,8 +336,8 @@ def _plan_hands_low(ahead: float, draws: Floats, height: float, worker: Worker) 
 
     Args:
         ahead: distance of the work ahead of the feet [m].
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
