@@ -1,4 +1,4 @@
-"""Climbing a step or low ladder and descending backwards; looking round on the spot."""
+"""Climbing a step or low ladder and descending backwards, and looking round on the spot."""
 
 import math
 
@@ -12,11 +12,11 @@ from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang
 from hrc_env.motion.state import Worker
 
 HIGHEST_RISER_M = 0.32
-"""Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
+"""Maximum rise of one step [m]; the rungs of ladders are 0.25 to 0.30 m apart (EN 131-1)."""
 FIRST_M = 0.40
 """Distance from the initial stance to the first tread [m]."""
 TREAD_M = 0.24
-"""Distance from tread to tread [m]."""
+"""Horizontal distance from tread to tread [m]."""
 STEP_AT_S = 0.12
 """Time at which a climber's first foot lifts off [s]. The value is an estimate."""
 PERIOD_S = 0.72
@@ -29,7 +29,7 @@ TURN_S = 0.75
 
 @kernel
 def climb(t: float, worker: Worker) -> None:
-    """Add a climb to the pose of a standing worker: up, a stay, and down in reverse.
+    """Add a climb to the pose of a standing worker: climb up, stay, and descend in reverse.
 
     Args:
         t: time since the activity began [s].
@@ -52,7 +52,7 @@ def climb(t: float, worker: Worker) -> None:
 
 @kernel
 def start_climb(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to climb to a height and come down again.
+    """Plan to climb to a height and descend again.
 
     Args:
         draws: uniform random numbers (N_START,) in [0, 1).
@@ -95,11 +95,11 @@ def look_round(t: float, worker: Worker) -> None:
 
 @kernel
 def start_look_round(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to look to both sides; the height has no effect.
+    """Plan to look to both sides.
 
     Args:
         draws: uniform random numbers (N_START,) in [0, 1).
-        height: height of the work [m].
+        height: unused; part of the interface of start functions.
         worker: record into which the plan is written.
 
     Returns:

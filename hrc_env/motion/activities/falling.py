@@ -113,13 +113,13 @@ RISES_AT = 1.22
 TALL = 1.7
 """Greatest distance of head and hands from the stumble, in the unit of length of `POSES`."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
-"""Directions of a fall relative to the heading, tried in turn until there is room [rad]."""
+"""Directions of a fall relative to the heading [rad], tried in turn until there is room."""
 QUICKEST = 1.15
-"""Greatest rate of a fall relative to `POSES`."""
+"""Maximum speed of a fall relative to `POSES`."""
 SLOWEST = 0.9
-"""Least rate of a fall relative to `POSES`."""
+"""Minimum speed of a fall relative to `POSES`."""
 MOST_ROLL_RAD = 0.9
-"""Greatest roll of a lying trunk onto a side [rad]."""
+"""Maximum roll of a lying trunk to a side [rad]."""
 
 
 @kernel
@@ -151,7 +151,7 @@ def _interpolate(at: float, column: int) -> float:
 
 @kernel
 def _to_pose_time(since: float, worker: Worker) -> float:
-    """Convert the time [s] since the foot was caught to the time in `POSES` [s]."""
+    """Convert the time since the foot was caught [s] to the time in `POSES` [s]."""
     down = worker.fall_pace * since
     return min(down, LIES_S) + max(since - LIES_S / worker.fall_pace - worker.lie_s, 0.0)
 

@@ -1,7 +1,7 @@
 """Plans of work in place: with tools, pointing, lunges, and low work with both hands.
 
-`plan_...` returns the peak speed of the hands on their way to the work [m/s], an argument of
-`planning.finish_plan`.
+The functions `plan_...` return the peak speed of the hands on their way to the work [m/s], which
+is an argument of `planning.finish_plan`.
 """
 
 import math
@@ -29,29 +29,29 @@ The value is an estimate.
 _SCREW_S = (1.0, 1.3)
 """Range of the time to drive one screw [s]. The values are estimates."""
 _GAZE_M = 0.18
-"""Distance of the gaze point ahead of the fist, and to its right, when driving screws [m]."""
+"""Distances of the gaze point ahead of the fist and to its right when driving screws [m]."""
 _GAZE_DOWN_M = 0.2
 """Distance of the gaze point below the first screw when driving screws [m]."""
 LEVEL = Vector3(0.0, 0.0, 0.0)
 """Orientation of a tool that points straight ahead: yaw, pitch, roll [rad]."""
 HEAD_M = 0.25
-"""Distance from the fist to the hammer's head along the handle [m], see `props`."""
+"""Distance from the fist to the hammer's head along the handle [m], as in `props`."""
 FACE_M = 0.05
-"""Distance from the handle to the hammer's striking face [m], see `props`."""
+"""Distance from the handle to the hammer's striking face [m], as in `props`."""
 LIGHT_HZ = 5.6
-"""Frequency of light taps [Hz]; their speed is at most 1.1 m/s. The value is an estimate."""
+"""Frequency of light taps, with a speed of at most 1.1 m/s [Hz]. The value is an estimate."""
 LIGHT_M = 0.060
-"""Peak-to-peak size of light taps [m]. The value is an estimate."""
+"""Peak-to-peak amplitude of light taps [m]. The value is an estimate."""
 LOW_SHARE = 0.7
 """Size of low blows relative to other blows. The value is an estimate."""
 WALL_M = 1.2
-"""Height above which nails are driven into a wall instead of downwards [m]."""
+"""Height above which nails are driven horizontally into a wall instead of downwards [m]."""
 OVERHEAD_M = 1.7
 """Height above which work is overhead [m]."""
 BIT_M = 0.22
-"""Distance of the drill bit's tip ahead of the fist [m], see `props`."""
+"""Distance of the drill bit's tip ahead of the fist [m], as in `props`."""
 BIT_UP_M = 0.09
-"""Height of the drill bit's tip above the fist [m], see `props`."""
+"""Height of the drill bit's tip above the fist [m], as in `props`."""
 THRUST_M = 0.04
 """Depth of a hole, and length of a screw [m]."""
 SCREWS = 4
@@ -65,7 +65,7 @@ FIST_LEFT_M = 0.127
 ASKEW_RAD = -0.25 * math.pi
 """Yaw of the drill from the heading when driving screws into the robot's workpiece [rad]."""
 CUT_RAD = 0.6
-"""Pitch of the saw blade [rad]; 45 to 60 degrees to the board are usual.
+"""Pitch of the saw blade [rad]; angles of 45 to 60 degrees to the board are usual.
 
 The value is an estimate.
 """
@@ -160,7 +160,8 @@ def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
     Positions are relative to the initial position and heading: ahead, left, height [m].
 
     Args:
-        draws: (N_START,) uniform random numbers in [0, 1): 0 the hand, 2 the time for a screw.
+        draws: uniform random numbers (N_START,) in [0, 1); 0 selects the hand, 2 the time for a
+            screw.
         height: height of the first screw [m].
         worker: record into which the plan is written.
 
@@ -241,11 +242,11 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_point(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to point in a random direction ahead; the height has no effect.
+    """Plan to point in a random direction ahead.
 
     Args:
         draws: uniform random numbers (N_START,) in [0, 1).
-        height: height of the work [m].
+        height: unused; part of the interface of plan functions.
         worker: record into which the plan is written.
 
     Returns:
