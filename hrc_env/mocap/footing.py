@@ -124,7 +124,10 @@ def find_support(joints: Points3, fps: float) -> Support:
 
 
 def measure_floor_height(joints: Points3, fps: float) -> float:
-    """Return the height of the tips of feet at rest, or of the lowest ones if there are none [m]."""
+    """Return the height of the tips of feet at rest [m], or of the lowest feet if none is at rest.
+
+    The result is a percentile over time.
+    """
     height, rests = find_support(joints, fps)
     return float(
         np.percentile(height[rests], FLOOR_SHARE) if rests.any() else np.percentile(height, 5.0)

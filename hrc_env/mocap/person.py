@@ -12,7 +12,10 @@ from hrc_env.core.typing import Bools, Floats, Points3
 MEASURED_SHARE = 0.755
 """Total length of shank, thigh and trunk in the worker models, as a fraction of stature."""
 STRANGE = 2.0
-"""Maximum ratio of a bone's length to that of an adult of equal stature, and of its inverse."""
+"""Maximum ratio of a bone's length to that of an adult of equal stature.
+
+The minimum ratio is half the inverse of this value.
+"""
 
 
 def midpoint(joints: Points3, part: str) -> Points3:
