@@ -199,7 +199,7 @@ def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses
 
     Some programs write the positions of bones relative to their OFFSET. Such positions are
     recognized by their small size and added to the OFFSET. This criterion does not apply to the
-    position of the whole body (see `Moving.shift`).
+    position of the whole body, for which `Moving.shift` is used.
 
     Args:
         nodes: nodes of the hierarchy.

@@ -188,7 +188,10 @@ def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
 
 
 def _is_running(joints: Points3, height: Floats, fps: float) -> bool:
-    """Return whether the person is fast, with a foot near the floor at least every `AIR_S`."""
+    """Return whether the person is running.
+
+    A running person is fast, and has a foot near the floor at least once per `AIR_S`.
+    """
     hip = joints[:, JOINT["left_hip"], :2]
     speed_m_s = np.median(np.linalg.norm(np.diff(hip, axis=0), axis=-1)) * fps
     aloft = max((end - first for first, end in find_runs(height > LEVEL_M)), default=0)

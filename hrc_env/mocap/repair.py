@@ -161,7 +161,7 @@ def convert_to_metres(joints: Points3, source: str) -> Repaired:
 
 
 def turn_upright(joints: Points3, source: str, upward: Upward | None = None) -> Repaired:
-    """Rotate joints so that the person stands along +z."""
+    """Rotate joints to let the person stand along +z."""
     given, at_rest = upward or Upward()
     name = _find_upward_axis(joints, source, at_rest) if given is None else given
     name = name if name[:1] in ("+", "-") else f"+{name}"

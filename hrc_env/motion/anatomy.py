@@ -33,13 +33,13 @@ N_ROUND = 2 * len(ROUND)
 GRIP_M = 0.08
 """Distance of the grip from the wrist [m], about half the length of a hand."""
 HEEL_M = -0.045
-"""Position of the heel's floor contact ahead of the ankle [m]; it is behind, thus negative."""
+"""Position of the heel's floor contact ahead of the ankle [m]; negative because it is behind."""
 FOREARM_TWIST_RAD = 0.15
 """Outward twist of the forearm from the rest pose [rad], with which the palm faces the thigh."""
 HAND_TWIST_RAD = 0.35
 """Outward twist of the hand about the forearm from the rest pose [rad]."""
 STAND_SHARE = 0.994
-"""Height of the standing hip as a fraction of leg length; the knees are just unlocked."""
+"""Height of the hip in standing with slightly bent knees, as a fraction of leg length."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ WITH_LOAD = (*st.IDLE, *st.GIVING)
 ABOVE_M = 0.21
 """Height of working hands above a bench [m]. The value is an estimate."""
 CHEST_M = 1.2
-"""Greatest height at which loads are handed over [m]. The value is an estimate."""
+"""Maximum height at which loads are handed over [m]. The value is an estimate."""
 
 
 def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> None:

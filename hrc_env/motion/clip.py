@@ -23,9 +23,9 @@ SLOWEST_HZ = 5.0
 FASTEST_HZ = 1000.0
 """Highest plausible frame rate [Hz]. The value is an estimate."""
 FARTHEST_M = 200.0
-"""Greatest plausible distance of the root from the origin [m]. The value is an estimate."""
+"""Maximum plausible distance of the root from the origin [m]. The value is an estimate."""
 FASTEST_M_S = 15.0
-"""Greatest plausible speed of the root [m/s]. The value is an estimate."""
+"""Maximum plausible speed of the root [m/s]. The value is an estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,13 +33,13 @@ class Clip:
     """Recorded motion that can be played by workers; it begins at the origin, facing +x."""
 
     controls: Floats
-    """Control vectors (T, N_CONTROLS), see `controls`; columns outside of `RECORDED` are zero."""
+    """Control vectors (T, N_CONTROLS); columns outside of `RECORDED` are zero."""
     fps: float
     """Frame rate [Hz]."""
     contacts: Bools
     """Mask (T, 2) of the frames in which the left and the right foot stand on the floor."""
     size: Floats
-    """Body dimensions (N_SIZES,) of the worker for this motion [m], see `Anatomy.lengths`."""
+    """Body dimensions (N_SIZES,) to which the motion applies [m], as in `Anatomy.lengths`."""
     source: str
     """Name of the recording."""
 
@@ -72,7 +72,7 @@ class Clip:
 
 
 def move_to_origin(controls: Floats) -> Floats:
-    """Return control vectors moved so that the root begins at the origin, facing +x."""
+    """Transform control vectors to begin with the root at the origin, facing +x."""
     out = controls.copy()
     x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -149,7 +149,7 @@ def check_rate(fps: float, source: str) -> None:
 
 
 def find_footprints(feet: Floats, size: Floats) -> Floats:
-    """Return the ankle position and heading (T, 4) that a foot would have if it were flat.
+    """Return the ankle positions and headings (T, 4) of a foot if it were flat [m, rad].
 
     Args:
         feet: pose (T, 5 or more) of a foot: ankle position (3) [m], heading and pitch [rad].

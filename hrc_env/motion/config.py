@@ -53,7 +53,7 @@ class PeopleConfig:
     stay_down_probability: float = 0.15
     """Probability that a fallen worker lies on the floor for 15 to 40 s instead of `lie_s`."""
     run_probability: float = 0.0
-    """Probability that a worker with empty hands runs to a place, if the path is long enough."""
+    """Probability that a worker with empty hands runs to its destination if the path is long."""
     run_m_s: Range = (2.5, 3.5)
     """Speed of a run [m/s]; 2.5 m/s requires a path of 2.4 m, and 3.5 m/s a path of 4.4 m."""
     careless_probability: float = 0.01
@@ -142,14 +142,14 @@ class MotionConfig:
     At this distance, the targets in the robot's workspace are within reach of the workers.
     """
     near_azimuth_rad: float = 0.785
-    """Greatest angle about the base axis between the robot's front and a worker at the robot [rad].
+    """Maximum angle about the base axis between the robot's front and a worker at the robot [rad].
 
     The value is an estimate.
     """
     dwell_s: Range = (6.0, 16.0)
     """Duration of a stay at one workplace before the next errand [s]. The values are estimates."""
     spacing_m: float = 1.1
-    """Least distance between the workplaces of two workers [m]. The value is an estimate."""
+    """Minimum distance between the workplaces of two workers [m]. The value is an estimate."""
     near_pause_s: Range = (0.5, 2.0)
     """Duration of a pause at the robot [s]. The values are estimates."""
     away_pause_s: Range = (1.0, 4.0)
@@ -160,7 +160,7 @@ class MotionConfig:
     target_z_m: Range = (0.85, 1.4)
     """Height of a hand's target [m], from bench to shoulder."""
     target_spread_rad: float = 0.45
-    """Greatest angle between target and worker about the base axis [rad].
+    """Maximum angle between target and worker about the base axis [rad].
 
     The value is an estimate.
     """
@@ -217,7 +217,7 @@ class HandParams(NamedTuple):
     target_z_m: Range
     """Height of a hand's target [m]."""
     target_spread_rad: float
-    """Greatest angle between target and worker about the base axis [rad]."""
+    """Maximum angle between target and worker about the base axis [rad]."""
     hand_speed_m_s: Range
     """Peak speed of a reaching hand [m/s]."""
     sudden_speed_m_s: float

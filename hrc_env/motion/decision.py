@@ -176,7 +176,7 @@ def list_obstacles(decision: Decision) -> Floats:
 
 
 def list_places(decision: Decision) -> Iterator[Place]:
-    """Yield free workplaces for the job, beginning with the current goal of a worker under way."""
+    """Yield free workplaces for the job, beginning with the destination of a worker under way."""
     if decision.worker.travel == UNDER_WAY:
         yield Place(*decision.worker.place.tolist())
     yield from _list_free_places(decision, decision.job)

@@ -107,7 +107,7 @@ class BodyRates(NamedTuple):
     angular_velocity: Floats
     """Angular velocities (..., 22, 3) of the segments [rad/s]."""
     held: Floats
-    """Held props (..., N_HELD), see `holding.N_HELD`."""
+    """Held props (..., N_HELD); `holding.N_HELD` describes the columns."""
 
 
 class Advance(NamedTuple):
@@ -150,7 +150,7 @@ def make_state(
 
     Args:
         batch: number of environments.
-        n_workers: greatest number of workers in each environment.
+        n_workers: maximum number of workers in each environment.
         body: body of all workers, or a pool from which the bodies are sampled in each episode.
         config: settings of the motion.
         grounds: floor of the scene.
@@ -307,7 +307,7 @@ def watch(
         state: state of all workers, which is changed.
         elbow_and_tool_world: positions (B, 2, 3) of the elbow and tool of each arm, or of the front
             and back of each mobile robot [m].
-        motion: bodies of the workers.
+        motion: motion of the workers' bodies.
         dt_s: time since the last call [s].
         cue: signal of the task to the workers; None if the task has no signal.
     """
@@ -343,7 +343,7 @@ def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
 
     Args:
         state: state of all workers.
-        motion: bodies of the workers.
+        motion: motion of the workers' bodies.
     """
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])

@@ -114,7 +114,7 @@ def lift(t: float, worker: Worker) -> None:
 def _find_lean(worker: Worker) -> None:
     """Find the smallest lean with the targets within reach.
 
-    Targets out of reach at the greatest lean are moved nearer.
+    Targets out of reach at the maximum lean are moved nearer.
     """
     p = worker.p
     low, high, worker.lean = 0.0, MOST_LEAN, 0.0

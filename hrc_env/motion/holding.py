@@ -21,7 +21,7 @@ N_HELD = 8
 
 @kernel
 def write_prop_pose(out: Floats, worker: Worker) -> None:
-    """Write the kind, position and quaternion of the held prop into `out` (N_HELD,)."""
+    """Store the kind, position and quaternion of the held prop in `out` (N_HELD,)."""
     out[:] = 0.0
     out[0], out[4] = worker.q[c.PROP], 1.0
     if out[0] == 0.0:

@@ -14,7 +14,7 @@ ARM_KNEE = 0.97
 ARM_LIMIT = 0.998
 """Maximum extension of the arm, as a fraction of its length."""
 SHOULDER_RAD = 0.22
-"""Greatest rotation of a clavicle forward and upward [rad]."""
+"""Maximum rotation of a clavicle forward and upward [rad]."""
 LEG_LIMIT = 0.998
 """Maximum extension of a leg, as a fraction of its length, which prevents locked knees."""
 LEG_SOFTNESS_M = 0.05
@@ -188,7 +188,7 @@ def pose_trunk(worker: Worker) -> None:
 
 @kernel
 def _rest_on_floor(worker: Worker) -> None:
-    """Raise the trunk and head so that they do not penetrate the floor."""
+    """Raise the trunk and head if they would penetrate the floor."""
     p, r = worker.p, worker.r
     low = math.inf
     for k in range(an.N_ROUND):
@@ -379,12 +379,12 @@ def pose(worker: Worker) -> None:
 
 @kernel
 def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
-    """Write the unit quaternion (scalar first, w >= 0) of r[segment] by Shepperd's method.
+    """Compute the unit quaternion (scalar first, w >= 0) of r[segment] by Shepperd's method.
 
     Args:
         r: rotations (N, 3, 3).
         segment: row of `r` and of `out`.
-        out: quaternions (N, 4).
+        out: quaternions (N, 4), of which one row is written.
     """
     trace = r[segment, 0, 0] + r[segment, 1, 1] + r[segment, 2, 2]
     if trace > 0.0:
@@ -415,14 +415,14 @@ def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
 def write_angular_velocity(
     before: Floats, after: Floats, segment: int, duration: float, out: Floats
 ) -> None:
-    """Write the angular velocity between a rotation and a slightly later one, in the world frame.
+    """Compute the angular velocity in the world frame from two successive rotations.
 
     Args:
         before: rotations (N, 3, 3).
         after: rotations (N, 3, 3) a short time later.
         segment: row of `before`, `after` and `out`.
         duration: time between `before` and `after` [s].
-        out: angular velocities (N, 3) [rad/s].
+        out: angular velocities (N, 3), of which one row is written [rad/s].
     """
     x = y = z = 0.0
     for a in range(3):

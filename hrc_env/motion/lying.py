@@ -47,16 +47,16 @@ class LoadRow(np.void):
 LOAD = np.dtype((LoadRow, dtype_of(Load)))
 """NumPy data type of a `Load`; the fields of its rows are attributes in Python, too."""
 MOVED_M = 0.015
-"""Greatest random displacement of a load in a pile along x and y [m]."""
+"""Maximum random displacement of a load in a pile along x and y [m]."""
 TURNED_RAD = 0.03
-"""Greatest random rotation of a load in a pile [rad]."""
+"""Maximum random rotation of a load in a pile [rad]."""
 HIGH = ("pile", "bench", "task")
 """Kinds of workplaces with a surface for loads at the workplace's height.
 
 At other workplaces, loads rest on the floor or hang on the wall.
 """
 HUNG_M = 1.2
-"""Greatest height of boards that hang on a wall [m]. The value is an estimate."""
+"""Maximum height of boards that hang on a wall [m]. The value is an estimate."""
 AT_HAND_M = 0.13
 """Distance from `Load.stand` within which a worker can pick up the load [m]."""
 EXACT_M = 0.01

@@ -21,7 +21,7 @@ from hrc_env.motion.walk import brake
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments of a worker near which the robot is noticed."""
 MEETS_M = 0.20
-"""Greatest distance by which a hand adapts to the position of an offered tool [m].
+"""Maximum distance by which a hand adapts to the position of an offered tool [m].
 
 The value is an estimate.
 """

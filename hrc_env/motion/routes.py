@@ -49,7 +49,7 @@ def is_point_free(x: float, y: float, margin: float, ground: Ground) -> bool:
     Args:
         x: world x [m].
         y: world y [m].
-        margin: least slack far from the ends [m].
+        margin: minimum slack far from the ends [m].
         ground: obstacles.
     """
     least = margin
@@ -75,7 +75,7 @@ def is_line_free(x0: float, y0: float, x1: float, y1: float, margin: float, grou
         y0: world y of its first point [m].
         x1: world x of its last point [m].
         y1: world y of its last point [m].
-        margin: least slack far from the ends [m].
+        margin: minimum slack far from the ends [m].
         ground: obstacles.
     """
     n = int(math.hypot(x1 - x0, y1 - y0) / SAMPLE_M) + 1

@@ -17,7 +17,7 @@ ROUTES = ("walk", "push")
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
 """Activities that a job can have."""
 HIGHEST_M = 2.2
-"""Greatest height at which hands work [m]."""
+"""Maximum height at which hands work [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ _STACK = (
         (("take from the stack", 0.9), ("look at the work", 0.1)),
     ),
 )
-"""Jobs of `HRCPickPlace-v0`: taking parts from the robot's stack."""
+"""Jobs of `HRCPickPlace-v0`: taking parts from the stack of the robot."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (

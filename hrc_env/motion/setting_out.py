@@ -157,7 +157,7 @@ def _plan_way(
 
 
 def _has_cart(decision: Decision) -> bool:
-    """Return whether the cart to be pushed is within reach, or the scene has no such cart."""
+    """Return whether the required cart is within reach, or missing from the scene."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     return row >= 0 or not lying.has_load(decision.loads, kind)

@@ -27,7 +27,7 @@ TAKE_M = 0.52
 TAKE_S = 0.8
 """Time for which the hand is held out [s]."""
 BODY_M = 0.36
-"""Least distance of the hands from the worker's root [m]."""
+"""Minimum distance of the hands from the worker's root [m]."""
 OWN_SIDE_M = 0.30
 """Minimum distance of a hand's target from the midline between two workers [m]."""
 
@@ -169,7 +169,7 @@ def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Poin
     Args:
         x: world x of the target [m].
         y: world y of the target [m].
-        others: places (n, 2) of the other workers [m].
+        others: positions (n, 2) of the other workers [m].
         worker: record of the worker.
     """
     mx, my = worker.start_x, worker.start_y
@@ -194,7 +194,7 @@ def _draw_target(
         draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
-        height: least height of a target ahead [m].
+        height: minimum height of a target ahead [m].
         worker: record of the worker.
     """
     z = scale_draw(draws[3], *params.target_z_m)
@@ -221,8 +221,8 @@ def start_reach(
         draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
-        height: least height of a target ahead [m].
-        others: places (n, 2) of the other workers [m].
+        height: minimum height of a target ahead [m].
+        others: positions (n, 2) of the other workers [m].
         worker: record into which the plan is written.
 
     Returns:

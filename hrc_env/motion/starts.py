@@ -13,7 +13,7 @@ from hrc_env.motion import generator
 from hrc_env.worker.body import Body, worker_truth
 
 APART_M = 0.10
-"""Least distance of a robot's initial pose from a worker's true surface [m]."""
+"""Minimum distance of a robot's initial pose from a worker's true surface [m]."""
 ROBOT_TRIES, TRIES = 8, 40
 """Number of robot starts sampled before the workers are resampled, too; total number of samples."""
 
@@ -38,7 +38,7 @@ def begin_apart(
         motion: state of the workers, which is reset.
         rngs: random number generators of the workers, one for each environment of the batch.
         chain: kinematic chain of the robot.
-        bodies: bodies of the workers.
+        bodies: measurements of the workers' bodies.
         casts: prescribed workers and activities, by environment.
 
     Returns:
@@ -81,7 +81,7 @@ def measure_gap_m(
         q: joint angles (N, n_joints) of the robots [rad].
         motion: state of the workers.
         chain: kinematic chain of the robot.
-        bodies: bodies of the workers.
+        bodies: measurements of the workers' bodies.
     """
     truth = worker_truth(bodies, generator.current(motion, ids))
     arm, radius_m = chains.capsules(chain, q), chain.capsule_radius_m

@@ -63,9 +63,9 @@ class Worker:
     activity: int
     """Current activity, an index into `ACTIVITY_NAMES`."""
     time_s: float
-    """Time since the activity began, on the activity's own clock [s]."""
+    """Time since the activity began, on the clock of the activity [s]."""
     duration_s: float
-    """Duration of the activity on its own clock [s]."""
+    """Duration of the activity on the clock of the activity [s]."""
     pace: float
     """Rate of the activity's clock: 1 as planned, 0 if halted, negative for reversed motion."""
     wanted_pace: float
@@ -77,7 +77,7 @@ class Worker:
     footprints: Annotated[Floats, (MAX_STEPS, 5)]
     """Footprint of each step: x, y [m], heading [rad], step length / full stride, height [m]."""
     place: Annotated[Floats, (4,)]
-    """Workplace of the errand: x, y [m], heading [rad], height of the work [m]."""
+    """Destination of the errand: x, y [m], heading [rad], height of the work [m]."""
     stay_until_s: float
     """Episode time until which the worker stays at the workplace [s]."""
     waiting_since_s: float
@@ -87,7 +87,7 @@ class Worker:
     travel: int
     """Progress of the errand: `THERE`, `UNDER_WAY` or `WAITING`."""
     place_kind: int
-    """Kind of the workplace, an index into `WORKPLACE_KINDS`, or `NOWHERE` or `ON_STAGE`."""
+    """Kind of the destination, an index into `WORKPLACE_KINDS`, `NOWHERE` or `ON_STAGE`."""
 
     # The worker and the robot.
     robot_world: Annotated[Floats, (2, 3)]

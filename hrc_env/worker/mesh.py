@@ -23,7 +23,7 @@ class SkinMesh:
     uv: Floats
     """Texture coordinates (V, 2) in [0, 1], with v = 0 at the first row of the texture."""
     weights: Floats
-    """Skinning weights (V, S) of the segments; rows sum to 1 and have at most four nonzero values."""
+    """Skinning weights (V, S) of the segments, at most four per vertex; rows sum to 1."""
     texture: NDArray[np.uint8]
     """RGB texture (H, W, 3)."""
 

@@ -111,7 +111,7 @@ The value is an estimate.
 RISES_AT = 1.22
 """Distance from the stumble to the final standing position, in the unit of length of `POSES`."""
 TALL = 1.7
-"""Greatest distance of head and hands from the stumble, in the unit of length of `POSES`."""
+"""Maximum distance of head and hands from the stumble, in the unit of length of `POSES`."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
 """Directions of a fall relative to the heading [rad], tried in turn until there is room."""
 QUICKEST = 1.15

@@ -128,7 +128,7 @@ def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
 
     Args:
         clips: recorded motion.
-        lengths: dimensions (n_bodies, N_SIZES) of the bodies [m], see `Anatomy.lengths`.
+        lengths: dimensions (n_bodies, N_SIZES) of the bodies [m], as in `Anatomy.lengths`.
         stage: floor and starting poses.
 
     Returns:

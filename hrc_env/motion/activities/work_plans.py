@@ -1,4 +1,4 @@
-"""Plans of work in place: with tools, pointing, lunges, and low work with both hands.
+"""Plans of work in place with tools, of pointing, of lunges, and of low work with both hands.
 
 The functions `plan_...` return the peak speed of the hands on their way to the work [m/s], which
 is an argument of `planning.finish_plan`.
@@ -76,9 +76,9 @@ SHOULDER_M = 0.19
 POINT_M_S = 1.5
 """Peak speed of a pointing hand [m/s]. The value is an estimate."""
 NEAREST_ARMS = 1.2
-"""Least distance of the target of a lunge, in arm lengths. The value is an estimate."""
+"""Minimum distance of the target of a lunge, in arm lengths. The value is an estimate."""
 FARTHEST_ARMS = 1.5
-"""Greatest distance of the target of a lunge, in arm lengths. The value is an estimate."""
+"""Maximum distance of the target of a lunge, in arm lengths. The value is an estimate."""
 
 
 @kernel
