@@ -1,4 +1,4 @@
-"""Reader of Acclaim files: a skeleton (ASF) and its motion (AMC), as in the CMU database.
+"""Reader of Acclaim files, with skeletons (ASF) and motion (AMC) as in the CMU database.
 
 The rotation of a bone in its parent's frame is C M C^-1. C rotates the axes of the file to those of
 the bone ("axis" in the file). M is the rotation by the bone's degrees of freedom about fixed axes,
@@ -31,7 +31,7 @@ class _Bone:
     length: float = 1.0
     """Length of the bone [unit of the file]."""
     axis: Rotations = field(default_factory=lambda: np.eye(3))
-    """Rotation (3, 3) from the bone's axes to the file's."""
+    """Rotation (3, 3) from the axes of the bone to those of the file."""
     freedoms: tuple[str, ...] = ()
     """Degrees of freedom, in the order of the file."""
 
@@ -51,7 +51,7 @@ class _Skeleton:
     parent: dict[str, str] = field(default_factory=dict)
     """Name of each bone's parent."""
     per_inch: float = 1.0
-    """Length of one inch in the unit of the file (CMU: 0.45)."""
+    """Length of one inch in the unit of the file, 0.45 in the CMU database."""
     is_in_radians: bool = False
     """Whether angles are in radians instead of degrees."""
 
@@ -256,7 +256,7 @@ def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
 
 
 class _Nodes(NamedTuple):
-    """Bones and chain tips of a skeleton, parents first."""
+    """Bones and chain tips of a skeleton, with parents before their children."""
 
     names: list[str]
     """Name of each node."""
@@ -267,7 +267,7 @@ class _Nodes(NamedTuple):
 
 
 def _list_nodes(skeleton: _Skeleton) -> _Nodes:
-    """Return the bones and chain tips of a skeleton, parents first."""
+    """Return the bones and chain tips of a skeleton, with parents before their children."""
     names, parent, along, tips = [ROOT], [-1], [np.zeros(3)], []
     for node, name in enumerate(names):  # the list grows during the iteration
         children = [child for child, above in skeleton.parent.items() if above == name]

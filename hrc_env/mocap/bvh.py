@@ -25,7 +25,7 @@ The value is an estimate.
 LIMB = 4
 """Minimum number of nodes, including the tip, in a chain of a leg or of a trunk with an arm."""
 NEAR_ZERO = 0.5
-"""Ratio of the length of a bone's positions to that of its OFFSET below which they are added."""
+"""Ratio of a bone's positions to its OFFSET below which the positions are added to it."""
 
 
 @dataclass(slots=True)

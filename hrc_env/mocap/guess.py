@@ -10,9 +10,9 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
 
 HEADING_S = 0.25
-"""Standard deviation of the smoothing by which the heading follows the pelvis [s]."""
+"""Standard deviation of the smoothing of the pelvis's direction, which defines the heading [s]."""
 PELVIS_SHARE = 0.45
-"""Contribution of the pelvis to the pitch of the trunk, as a fraction, as in `posture.lean`."""
+"""Fraction of the trunk's pitch that is due to the pelvis, as in `posture.lean`."""
 VERTICAL_SHARE = 0.2
 """Horizontal extent of a foot, relative to its length, below which it has the pelvis's heading."""
 NOSE_PITCH_RAD = 0.6

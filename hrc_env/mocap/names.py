@@ -36,8 +36,7 @@ SIDED: dict[str, tuple[str, ...]] = {
 }
 """Names of each joint without prefixes and sides, in the order of preference.
 
-The word for the side may be before, after or inside a name; "x end" is the tip (End Site) of joint
-x.
+The word for the side may be before, after or inside a name; "x end" is the End Site of joint x.
 """
 HEAD: tuple[str, ...] = ("head", "skull", "face")
 """Names of the node that rotates with the face."""
@@ -105,7 +104,7 @@ OWN = frozenset(
 """Words that must not be omitted from a name, since they change its meaning."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 CUT = 0.05
-"""Cost of each word omitted before a name; the name of a joint with index k has a cost of k."""
+"""Cost of each word omitted before a name, relative to one rank in `SIDED`."""
 TAIL = 0.2
 """Cost of each word omitted after a name."""
 TURNED = 0.1

@@ -90,6 +90,6 @@ def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
 
 
 def place_at_rest(parent: Ints, offset: Floats) -> Points3:
-    """Return the origins (N, 3) of a tree's nodes if all rotations are zero."""
+    """Return the origins (N, 3) of a tree's nodes in the pose without rotations."""
     rotation = np.tile(np.eye(3), (1, len(offset), 1, 1))
     return compose_tree(parent, offset[None], rotation).position[0]

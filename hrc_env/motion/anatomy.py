@@ -1,4 +1,4 @@
-"""Bones of a worker for the kinematics: offsets and frames at rest, and body dimensions."""
+"""Bones of a worker for the kinematics, with offsets and frames at rest, and body dimensions."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,11 +9,11 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.worker.body import N_SEGMENTS, PARENT, Body
 
 CHEST, HEAD = 3, 5
-"""Segments of the trunk to which limbs and gaze refer."""
+"""Indices of the chest, which carries the arms, and of the head."""
 LEFT, SIDE_STRIDE = 6, 8
 """First segment of the left side, and number of segments per side, as ordered in `worker.body`."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
-"""Segments of one side, relative to its first segment."""
+"""Segments of one side of the body, counted from its first segment."""
 
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
@@ -26,7 +26,7 @@ the pelvis, of the ball ahead of and above the ankle, and of the heel ahead of t
 length of the upper arm [m].
 """
 ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
-"""Capsules on which a lying trunk rests."""
+"""Names of the capsules on which a lying trunk rests."""
 N_ROUND = 2 * len(ROUND)
 """Number of ends of the capsules `ROUND`; the shoulder capsules are attached to the chest."""
 

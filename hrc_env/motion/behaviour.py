@@ -123,7 +123,7 @@ def begin_episode(
 
 
 def choose_activity(decision: Decision) -> Action:
-    """Choose and plan the next activity."""
+    """Choose and plan the next activity of a worker."""
     worker = decision.worker
     reaction, left = worker.current_reaction, float(worker.reaction_until_s) - decision.clock_s
     worker.current_reaction = st.NO_REACTION
@@ -251,7 +251,7 @@ def _begin_activity(decision: Decision, activity: int) -> Action:
 
 
 def _begin_standing(duration_s: float) -> Action:
-    """Return the action of standing for a duration [s]."""
+    """Return an action in which the worker stands for a duration [s]."""
     return Action(st.STAND, max(duration_s, 0.05))
 
 

@@ -1,4 +1,4 @@
-"""Closed-form motion of every activity, and smooth transitions between activities."""
+"""Evaluation of the closed-form motion of activities, with smooth transitions between them."""
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
@@ -20,7 +20,7 @@ from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import walk, write_footprint
 
 BLEND_S = 0.45
-"""Time in which the difference between two activities decays [s], about that of one step."""
+"""Time in which the difference between two activities decays [s], about one step period."""
 RATE_H_S = 1e-4
 """Time step of the finite differences for velocities [s]; the error is 3 mm/s at 60 m/s^2."""
 
@@ -73,7 +73,7 @@ def evaluate(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def stop(worker: Worker) -> float:
-    """End an activity with the worker standing at its end, and release a load that was put down.
+    """End an activity with the worker standing at the final pose, and release a load put down.
 
     Returns:
         The angle added to the heading to wrap it, a multiple of a full turn [rad].

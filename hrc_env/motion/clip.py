@@ -1,4 +1,4 @@
-"""Clips: recorded motion as control vectors, stored in files that any worker can play."""
+"""Clips, which are recorded motion as control vectors, for playback by workers of any size."""
 
 import io
 import zipfile
@@ -15,9 +15,9 @@ from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_
 from hrc_env.motion.curves import pivot_foot
 
 VERSION = 1
-"""Version of the file format; it increases when columns or fields change."""
+"""Version of the file format, which increases with each change of columns or fields."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
-"""Columns (32,) of the control vector that a recording fills: the blended ones and the feet."""
+"""Columns (32,) of the control vector that are recorded: the blended columns and the feet."""
 SLOWEST_HZ = 5.0
 """Lowest plausible frame rate [Hz]. The value is an estimate."""
 FASTEST_HZ = 1000.0

@@ -39,7 +39,7 @@ class PeopleConfig:
     speed_m_s: Range = (0.8, 1.4)
     """Walking speed of a worker, sampled once per episode [m/s]; typical of adults indoors."""
     tempo: float = 1.0
-    """Factor of the durations of pauses and of stays at a workplace; below 1 is faster."""
+    """Factor applied to the durations of pauses and of stays at a workplace."""
     sudden_probability: float = 0.05
     """Probability that a reach is sudden, as the approach speeds of ISO 13855 assume."""
     lunge_probability: float = 0.01
@@ -53,7 +53,7 @@ class PeopleConfig:
     stay_down_probability: float = 0.15
     """Probability that a fallen worker lies on the floor for 15 to 40 s instead of `lie_s`."""
     run_probability: float = 0.0
-    """Probability that a worker with empty hands runs to its destination if the path is long."""
+    """Probability that a worker with empty hands runs if the path is sufficiently long."""
     run_m_s: Range = (2.5, 3.5)
     """Speed of a run [m/s]; 2.5 m/s requires a path of 2.4 m, and 3.5 m/s a path of 4.4 m."""
     careless_probability: float = 0.01
@@ -156,7 +156,7 @@ class MotionConfig:
     """Duration of a pause elsewhere [s]. The values are estimates."""
 
     target_radius_m: Range = (0.45, 0.9)
-    """Distance of a hand's target from the base axis [m], inside the robot's workspace."""
+    """Distance of a hand's target in the robot's workspace from the base axis [m]."""
     target_z_m: Range = (0.85, 1.4)
     """Height of a hand's target [m], from bench to shoulder."""
     target_spread_rad: float = 0.45
@@ -176,7 +176,7 @@ class MotionConfig:
     hold_s: Range = (0.2, 1.4)
     """Time for which the hands work at the target [s]. The values are estimates."""
     lift_s: Range = (1.0, 1.4)
-    """Time to bend down to a load, and time to raise it [s]; the wrists reach about 1.3 m/s."""
+    """Time to bend down to a load, and to raise it [s]; the wrists move at up to about 1.3 m/s."""
     load_z_m: Range = (0.15, 0.45)
     """Height of the grips of a load that stands on the floor or a low box [m].
 

@@ -69,7 +69,7 @@ class Cast:
     """Prescribed workers and first activities of one episode; all other choices are random."""
 
     n_workers: int | None = None
-    """Number of workers; None for a random number."""
+    """Number of workers; None if it is random."""
     bodies: tuple[int, ...] | None = None
     """Rows of the first workers' bodies in the pool; None for random bodies."""
     activities: tuple[int, ...] | None = None
@@ -83,7 +83,7 @@ class MotionState:
     """State of all workers; copying its arrays copies the state."""
 
     workers: Records2[Worker]
-    """Record of each worker (B, W)."""
+    """Records (B, W) of the workers."""
     loads: Records2[Load]
     """Loads (B, L) at rest in the scene."""
     mind: BehaviourParams
@@ -136,7 +136,7 @@ class Decision:
 
     @property
     def job(self) -> Job:
-        """Current or intended job."""
+        """Current or next job."""
         return self.mind.schedule.jobs[self.worker.job]
 
     @property

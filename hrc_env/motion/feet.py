@@ -21,7 +21,7 @@ PUSH_PITCH = 1.0
 FLAT_S = 0.10
 """Time from heel strike to a flat foot [s]."""
 ROLL_SHARE = 0.62
-"""Time from heel-off to toe-off as a fraction of the period of a step."""
+"""Time from heel-off to toe-off, as a fraction of the period of a step."""
 RAMP_SHARE = 0.29
 """Fraction of a swing during which the foot accelerates, and equally decelerates."""
 LIFT_BASE_M = 0.025
@@ -29,11 +29,11 @@ LIFT_BASE_M = 0.025
 LIFT_STRIDE_M = 0.045
 """Additional rise of the foot in a full stride [m]."""
 RUN_RAMP_SHARE = 0.36
-"""Value of `RAMP_SHARE` for runners. The value is an estimate."""
+"""Value that replaces `RAMP_SHARE` in a run. The value is an estimate."""
 KICK_M = 0.20
 """Additional rise of a runner's heel behind the body [m]. The value is an estimate."""
 KICK_PITCH = 1.3
-"""Push-off pitch of a runner as a multiple of a walker's. The value is an estimate."""
+"""Ratio of the push-off pitch in a run to that in a walk. The value is an estimate."""
 
 
 class FootPitch(NamedTuple):

@@ -31,7 +31,7 @@ class FloorGrid(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floorplan:
-    """The floor of a scene for planning."""
+    """Floor of a scene, with its free space, for the planning of paths."""
 
     grid: FloorGrid
     """Slack on a grid over the floor."""

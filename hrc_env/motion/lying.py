@@ -81,7 +81,7 @@ class Extent(NamedTuple):
 
 
 class Footprints(NamedTuple):
-    """Rectangles that loads cover on the floor."""
+    """Rectangles on the floor that are covered by loads."""
 
     middle: Floats
     """Centres (n, 2) in the world [m]."""
@@ -115,7 +115,7 @@ def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Loa
 
 
 def get_place(place: Workplace) -> Place:
-    """Return the pose at which a worker stands at a workplace."""
+    """Return the pose of a worker at a workplace, with the height of the work."""
     return Place(*place.xy_m, place.yaw_rad, place.height_m)
 
 

@@ -1,4 +1,4 @@
-"""Paths over the floor: straight lines joined by arcs, parameterized by arc length.
+"""Paths on the floor of straight lines joined by arcs, parameterized by arc length.
 
 Each line or arc is a row of `Worker.path`. The columns are the arc length at its beginning [m]; x,
 y [m] and the direction [rad] (not wrapped) at this point; the curvature [1/m]; and the integral of

@@ -26,7 +26,7 @@ RELAXED_ELBOW = 0.38
 RELAXED_OUT = 0.26
 """Abduction of a hanging upper arm from the trunk [rad]. The value is an estimate."""
 HAND_OUT_M = 0.05
-"""Lateral distance of a hanging hand from its elbow [m], to clear broad hips.
+"""Lateral distance of a hanging hand from its elbow [m], with which it clears broad hips.
 
 The value is an estimate.
 """

@@ -1,4 +1,4 @@
-"""Workers' reactions to the robot: pausing, or withdrawing the hands and stepping back.
+"""Reactions of workers to the robot by pausing, or by withdrawing the hands and stepping back.
 
 Hands pause or withdraw because the clock of their activity halts or runs backwards. Walkers brake.
 The kind and delay of a reaction are sampled when an activity begins.
@@ -139,7 +139,7 @@ def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[W
 
 @kernel
 def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
-    """Move the target of a hand that takes a tool towards the offered point, if that is close.
+    """Move the target of a hand that takes a tool towards the offered point, if this is close.
 
     Args:
         offered: point (3,) at which the tool is offered [m].

@@ -27,7 +27,7 @@ from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
 AWAY_M = 3.0
-"""Default length of a path [m]."""
+"""Default length of a straight path [m]."""
 FAR_M = 8.0
 """Length of the walks and runs that are evaluated [m]."""
 OPEN = FloorGrid(np.full((401, 401), 9.0), np.full(2, -10.0))
@@ -162,7 +162,13 @@ def _turn(draws: Floats, height_m: float, worker: Worker) -> float:
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
-    """Return the activity of picking up a load."""
+    """Return an activity of picking up a load.
+
+    Args:
+        prop: load, an index into `PROPS`.
+        on_shoulder: whether the load is carried on the shoulder.
+        height_m: height of the grips [m].
+    """
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
         """Plan to pick up the load."""
@@ -226,4 +232,4 @@ FOR_TASKS: dict[str, tuple[Act, ...]] = {
 }
 """Scenes of activities that occur only in tasks, by name."""
 SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
-"""All scenes by name."""
+"""All scenes, by name."""

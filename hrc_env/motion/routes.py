@@ -1,4 +1,4 @@
-"""Paths around objects and people: A* on a grid (Hart et al. 1968) with shortcuts."""
+"""Search for paths around objects and people by A* on a grid (Hart et al. 1968) with shortcuts."""
 
 import heapq
 import math
@@ -142,7 +142,7 @@ def is_path_free(ground: Ground, worker: Worker) -> bool:
 
 @kernel(makes_arrays=True)
 def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
-    """Find a short path by A* and write its corners.
+    """Find the corners of a short path by A*.
 
     Args:
         start: first point.

@@ -15,7 +15,7 @@ HERE = "here"
 ROUTES = ("walk", "push")
 """Values of `Job.by`, the way in which a worker goes to the workplace of a job."""
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
-"""Activities that a job can have."""
+"""Names of the activities that a job can have."""
 HIGHEST_M = 2.2
 """Maximum height at which hands work [m]."""
 
@@ -44,7 +44,7 @@ class Job:
     height_m: float = 0.0
     """Height of the work above the floor [m]; 0 for the workplace's height."""
     waits: bool = False
-    """Whether the job waits for the task's signal; until then the job before it is repeated."""
+    """Whether the job waits for the task's signal, before which the previous job is repeated."""
 
 
 JOBS: tuple[Job, ...] = (
@@ -221,7 +221,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
 
 
 class Choice(NamedTuple):
-    """A job that may come next."""
+    """A job that may be chosen, with its weight."""
 
     job: int
     """Index into the schedule's jobs."""
@@ -240,7 +240,7 @@ class Schedule:
     robot: int
     """Index of the first job at the robot."""
     begins: tuple[Choice, ...]
-    """Jobs with which errands away from the robot begin; empty if there are none."""
+    """Choices of jobs with which errands away from the robot begin; possibly empty."""
 
 
 def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:

@@ -53,7 +53,7 @@ STUMBLE_TO = ("robot", "open", "floor")
 
 
 class Action(NamedTuple):
-    """An activity that begins, with its duration."""
+    """A planned activity and its duration."""
 
     activity: int
     """Index into `ACTIVITY_NAMES`."""
@@ -189,7 +189,7 @@ def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Ac
 
 
 def step_back(decision: Decision) -> Action | None:
-    """Begin to step back, if there is room behind the worker."""
+    """Begin to step back, or return None if there is no room behind the worker."""
     if decision.is_loaded:
         return None
     plan, worker = decision.mind.plan, decision.worker
@@ -221,7 +221,7 @@ def has_arrived(decision: Decision) -> bool:
 
 
 def check_traffic(decision: Decision, action: Action) -> Meeting:
-    """Return when and where a worker that begins an action now comes too close to another one."""
+    """Predict when and where a worker, if it begins an action now, is too close to another one."""
     if len(decision.workers) == 1:
         return Meeting(-1.0, 0.0, 0.0)
     worker = decision.worker
@@ -256,7 +256,7 @@ def begin_clip(decision: Decision) -> Action | None:
 
 
 def _begin_clip_here(decision: Decision, piece: int) -> Action | None:
-    """Begin to play a piece of a clip on the spot, if there is room."""
+    """Begin to play a piece of a clip on the spot, or return None if there is no room."""
     mind, worker = decision.mind, decision.worker
     for turn_rad in TURNS_RAD:
         action = Action(st.CLIP, start_clip(piece, turn_rad, mind.clips, worker))

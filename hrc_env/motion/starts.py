@@ -27,7 +27,7 @@ def begin_apart(
     bodies: Body,
     casts: Mapping[int, generator.Cast] = generator.NOBODY_CAST,
 ) -> JointAngles:
-    """Begin episodes in which the robots start away from the workers.
+    """Begin episodes in which the robots start at a distance from the workers.
 
     A start of a robot that is too close to a worker is sampled again; after `ROBOT_TRIES` samples,
     the workers are sampled again, too.

@@ -1,4 +1,4 @@
-"""State of the workers' motion: one structured array, with axes for environments and workers.
+"""State of the workers' motion, a structured array with axes for environments and workers.
 
 Lengths are in metres, times in seconds, angles in radians. A kernel takes the record of one worker
 (`Worker`) or an array of them. The fields are attributes of `WORKER` rows in Python, too.
@@ -28,11 +28,11 @@ N_FRAMES = N_SEGMENTS + 1
 
 
 class Worker:
-    """One simulated worker: body, current activity, the plan of that activity and scratch space.
+    """Record of a worker with body, current activity, the plan of the activity, and scratch space.
 
-    The fields from `start_x` to `roots` are written when an activity begins (`activities`); the
-    closed form of the activity reads them. Yaw, pitch and roll are rotations about z, y and x:
-    world_from_object = Rz(yaw) Ry(pitch) Rx(roll).
+    The fields from `start_x` to `roots` are set when an activity begins, and are the parameters of
+    its closed-form motion (package `activities`). Yaw, pitch and roll are rotations about z, y and
+    x: world_from_object = Rz(yaw) Ry(pitch) Rx(roll).
     """
 
     # The episode.
@@ -45,7 +45,7 @@ class Worker:
     frame: Annotated[Floats, (N_SEGMENTS, 3, 3)]
     """Axes of each limb bone at rest, as rows (bone, hinge x bone, hinge); otherwise zero."""
     lengths: Annotated[Floats, (N_SIZES,)]
-    """Body dimensions [m]; `anatomy` names the columns."""
+    """Body dimensions [m], with the columns described at `anatomy.N_SIZES`."""
     trunk_ends: Annotated[Floats, (N_ROUND, 5)]
     """Ends of the trunk's capsules: segment, position (3) in its frame [m], radius [m]."""
     speed_m_s: float
@@ -143,7 +143,7 @@ class Worker:
     load_grip: Annotated[Floats, (6,)]
     """Grips of the left and the right hand in the load's frame [m]."""
     load_used: Annotated[Floats, (2,)]
-    """1 for each hand, left and right, that holds the load, else 0."""
+    """Flags of the left and the right hand: 1 if it holds the load, otherwise 0."""
 
     # Walking, running, falling, pushing.
     sharpest: float
@@ -219,7 +219,7 @@ class Worker:
     target: Annotated[Floats, (6,)]
     """World positions of the targets of the left and the right grip [m]."""
     hands_used: Annotated[Floats, (2,)]
-    """1 for each hand, left and right, that moves to its target, else 0."""
+    """Flags of the left and the right hand: 1 if it moves to its target, otherwise 0."""
     gaze_yaw: float
     """Yaw of the head towards the work [rad]; left is positive."""
     gaze_pitch: float
@@ -379,7 +379,7 @@ TAKING = (PICK_UP, RECEIVE)
 GIVING = (SET_DOWN, HAND_OVER)
 """Activities with the closed-form motion of picking up a load, reversed in time."""
 WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
-"""Activities that a job cannot have."""
+"""Activities not available to jobs."""
 NOWHERE = -1
 """Value of `place_kind` for a worker without an errand."""
 ON_STAGE = -2

@@ -25,7 +25,7 @@ FALL_APART_M = 1.3
 
 
 class HandsClearance(NamedTuple):
-    """A disc ahead of a worker that other workers avoid."""
+    """Disc ahead of a worker from which other workers keep away."""
 
     ahead: float
     """Distance of the disc's centre ahead of the root [m]; 0 for no disc."""
@@ -49,7 +49,7 @@ PUSHING = HandsClearance(1.0, 0.95)
 PLAYING = HandsClearance(0.01, 1.15)
 """Clearance of a worker that plays a clip, which includes an arm's length on all sides."""
 FALLING = HandsClearance(0.01, FALL_APART_M)
-"""Clearance of a falling worker, with head and feet far from the pelvis, plus half a body."""
+"""Clearance of a falling worker: distance from pelvis to head or feet, plus half a body."""
 BEHIND_M = 0.40
 """Distance of a kneeling worker's shank behind the root [m]."""
 SHANK_M = 0.66

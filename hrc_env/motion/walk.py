@@ -31,9 +31,9 @@ CADENCE_PER_MIN = 96.2
 CADENCE_POWER = 0.468
 """Exponent of the speed in the fit above."""
 SLOWEST_M_S = 0.65
-"""Minimum speed in the fit above [m/s]; slower starts and turns have the cadence of this speed."""
+"""Minimum speed for the cadence [m/s]; slower walks have the cadence of this speed."""
 LEG_M = 0.8685772217237624
-"""Leg length for which the fit holds [m]; step periods scale with the square root of it."""
+"""Leg length for which the fit holds [m]; step periods scale with the root of the leg length."""
 SWING_SHARE = 0.80
 """Swing time as a fraction of the period of a step, at 1 m/s."""
 SWING_FAST_SHARE = 0.02
@@ -90,7 +90,7 @@ SWING_FAST_RAD = 0.104
 FULL_SWING = 1.1
 """Relative pace beyond which the arm swing does not grow."""
 ELBOW_SWING = 0.73
-"""Bend of the elbow as a fraction of the arm swing."""
+"""Bend of the elbow, as a fraction of the arm swing."""
 LOADED_TWIST = 0.4
 """Fraction of the trunk's twist that remains with a load."""
 LURCH_S = 1.4
@@ -109,7 +109,7 @@ class Pace(NamedTuple):
 
 
 SIDE_STEP_PACE = Pace(0.0, 0.2, 0.52)
-"""Pace of side steps. The value is an estimate."""
+"""Pace of side steps. The values are estimates."""
 
 
 @kernel

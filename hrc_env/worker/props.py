@@ -31,7 +31,7 @@ Xyz = Sequence[float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prop:
-    """An object that can be held, described in the frame of the object."""
+    """An object that can be held, described in a frame fixed to it."""
 
     name: str
     """Name of the prop."""

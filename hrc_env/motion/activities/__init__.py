@@ -1,4 +1,4 @@
-"""Activities of a worker, each with a start function and a closed form in time.
+"""Activities of a worker, each with a start function and a motion in closed form.
 
 `start_...(draws, height, worker)` plans an activity from `N_START` uniform random numbers in [0, 1)
 and the height of the work [m] (0 for a random height), and returns its duration [s]. Work in place

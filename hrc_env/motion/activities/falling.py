@@ -88,7 +88,7 @@ POSES = np.array([
     (5.70, 1.22, 0.957, 0.02, 0, 0.05, 0.05, 0.0, 0, 0.2, 0.0, 1.42, 0.22, 0.84, 1.2, 0.36, 0.74,
      1.30, 0.12, 0.0, 0.0, 0.0, 1.30, 0.12, 0.0, 0.0, 0.0, 1, 1, 1),
 ])  # fmt: skip
-"""Key poses of a fall: time [s], followed by the columns of `PLACES`."""
+"""Key poses of a fall, with the time [s] in the first column before those of `PLACES`."""
 TIMES_S = POSES[:, 0].copy()
 """Times of the key poses [s]."""
 PLACES = POSES[:, 1:].copy()
@@ -124,7 +124,7 @@ MOST_ROLL_RAD = 0.9
 
 @kernel
 def _find_slope(k: int, column: int) -> float:
-    """Return the slope of a column at key pose k."""
+    """Return the rate of change of a column of `PLACES` at key pose k [1/s]."""
     if k == 0 or k == PLACES.shape[0] - 1:
         return 0.0
     before, after = TIMES_S[k] - TIMES_S[k - 1], TIMES_S[k + 1] - TIMES_S[k]
@@ -138,7 +138,7 @@ def _find_slope(k: int, column: int) -> float:
 
 @kernel
 def _interpolate(at: float, column: int) -> float:
-    """Interpolate a column of `PLACES` at a time of `POSES` [s]."""
+    """Return a column of `PLACES`, interpolated at a time of `POSES` [s]."""
     k = 0
     while k < PLACES.shape[0] - 2 and TIMES_S[k + 1] <= at:
         k += 1

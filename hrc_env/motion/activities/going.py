@@ -1,4 +1,4 @@
-"""Locomotion other than plain walking: turns, stumbles, steps back, and pushing a cart."""
+"""Locomotion other than normal walking: turns, stumbles, steps back, and pushing a cart."""
 
 import math
 

@@ -227,7 +227,7 @@ def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
 
 @kernel
 def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
-    """Plan the pose (6,) in the world at which the load is picked up or laid down."""
+    """Plan to pick up or lay down the load at a pose (6,) in the world frame."""
     for i in range(6):
         worker.tool_pose[i] = pose_world[i]
     worker.tool_pose[3] = worker.start_yaw + wrap(pose_world[3] - worker.start_yaw)
@@ -237,7 +237,7 @@ def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, worker: Worker) -> float:
-    """Complete the plan of handling a load by lean, path of the load and durations.
+    """Complete the plan of handling a load by its path, the lean of the trunk and durations.
 
     Args:
         raise_s: time in which the load is raised by a metre [s].

@@ -1,6 +1,6 @@
 """Playing of a clip, with two steps to its first pose and two steps to a stance after it.
 
-A frame holds the columns `clip.RECORDED` of a piece (`pieces.Clips`).
+A frame contains the columns `clip.RECORDED` of the control vector (see `pieces.Clips`).
 """
 
 import math
@@ -81,7 +81,7 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
 
 @kernel
 def _to_clip_time(since: float, worker: Worker) -> float:
-    """Convert the time [s] since playback began to the time in the recording [s]."""
+    """Convert the time since playback began [s] to the time in the recording [s]."""
     slow = worker.clip_s - PACE_S
     return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 

@@ -58,11 +58,11 @@ ELBOWS_RAD = 0.25
 LOW_ELBOWS_RAD = 0.4
 """Outward turn of the elbows at floor height [rad]. The value is an estimate."""
 RISE = 0.5
-"""Forward bulge of a hand's path to high work, relative to the height of the work."""
+"""Forward bulge of a hand's path to high work, divided by the height of the work."""
 OVER_KNEE_M = 0.22
 """Bulge of a hand's path over the knees to low work [m]."""
 LOW_M = 0.6
-"""Height below which work counts as low [m]."""
+"""Height below which work is considered low [m]."""
 KNEE_M = 0.055
 """Height of the knee joint in kneeling [m]."""
 HAUNCH_SHARE = 0.46
@@ -181,8 +181,7 @@ def place_hands(out: float, taken: float, early: float, worker: Worker) -> None:
     Args:
         out: completed fraction of the path of the tool from the belt to the work.
         taken: weight with which the hand follows the tool, from 0 to 1.
-        early: weight with which the hands follow their targets while the body is lowered, from 0 to
-            1.
+        early: weight of the hands' targets while the body is lowered, from 0 to 1.
         worker: record with the plan; its `q` is changed.
     """
     q, side, tool = worker.q, worker.side, worker.tool

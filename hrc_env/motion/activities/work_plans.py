@@ -27,7 +27,7 @@ _SCREW_STEP_M = 0.12
 The value is an estimate.
 """
 _SCREW_S = (1.0, 1.3)
-"""Range of the time to drive one screw [s]. The values are estimates."""
+"""Time to drive one screw [s]. The values are estimates."""
 _GAZE_M = 0.18
 """Distances of the gaze point ahead of the fist and to its right when driving screws [m]."""
 _GAZE_DOWN_M = 0.2
@@ -39,7 +39,7 @@ HEAD_M = 0.25
 FACE_M = 0.05
 """Distance from the handle to the hammer's striking face [m], as in `props`."""
 LIGHT_HZ = 5.6
-"""Frequency of light taps, with a speed of at most 1.1 m/s [Hz]. The value is an estimate."""
+"""Frequency of light taps [Hz]. The value is an estimate; the speed is at most 1.1 m/s."""
 LIGHT_M = 0.060
 """Peak-to-peak amplitude of light taps [m]. The value is an estimate."""
 LOW_SHARE = 0.7
@@ -70,7 +70,7 @@ CUT_RAD = 0.6
 The value is an estimate.
 """
 SHOULDER_SHARE = 1.50
-"""Height of the shoulder as a multiple of pelvis height."""
+"""Height of the shoulder, as a multiple of pelvis height."""
 SHOULDER_M = 0.19
 """Lateral distance of the shoulder from the body's midline [m]."""
 POINT_M_S = 1.5
