@@ -25,7 +25,7 @@ class PeopleConfig:
     fast_m_s: float = 0.6
     """Approach speed of the arm above which workers notice it within twice `notice_m` [m/s]."""
     delay_s: Range = (0.4, 0.8)
-    """Reaction time after noticing the arm [s]; longer than for an expected signal."""
+    """Reaction time after noticing the arm [s], longer than that to an expected signal."""
     pause_probability: float = 0.4
     """Probability that a worker reacts with a pause, in which the hands or the walker stop."""
     step_back_probability: float = 0.15
@@ -37,7 +37,7 @@ class PeopleConfig:
     detour_m: float = 0.55
     """Distance that walkers keep from the robot's tool and elbow [m]; 0 to ignore the robot."""
     speed_m_s: Range = (0.8, 1.4)
-    """Walking speed of a worker, sampled once per episode [m/s]; typical of adults indoors."""
+    """Walking speed of a worker, sampled once per episode [m/s], typical of adults indoors."""
     tempo: float = 1.0
     """Factor applied to the durations of pauses and of stays at a workplace."""
     sudden_probability: float = 0.05
@@ -129,7 +129,7 @@ ignore it; "headlong" workers watch the robot, but sometimes run and fall.
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Activities of workers and their speeds; values are sampled uniformly from ranges."""
+    """Activities of workers and their speeds. Values are sampled uniformly from the ranges."""
 
     near_probability: float = 0.85
     """Probability that the next errand is at the robot.
@@ -165,7 +165,7 @@ class MotionConfig:
     The value is an estimate.
     """
     hand_speed_m_s: Range = (0.5, 1.5)
-    """Peak speed of a reaching hand [m/s]; typical of calm manual work."""
+    """Peak speed of a reaching hand [m/s], typical of calm manual work."""
     sudden_speed_m_s: float = 2.5
     """Peak speed of a sudden reach [m/s].
 

@@ -35,7 +35,7 @@ The limit admits walks, in which one foot pushes off while the other lands.
 UNLOADED_RAD = 0.5
 """Penalty, in tilt of the feet, for beginning or ending a piece without both feet loaded [rad]."""
 TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
-"""Headings of a clip, relative to the worker's, that are tried [rad]; two steps suffice to turn."""
+"""Headings of a clip relative to the worker's, tried in turn [rad]; two steps limit the turn."""
 SPARE_M = 0.05
 """Additional slack around a piece, for deviations of workers from their workplaces [m]."""
 ENOUGH = 0.1
