@@ -17,13 +17,14 @@ from .env_info import EnvInfo
 
 TRAIN = "python -m hrc_env train"
 Size = int | dict[str, int]
-"""Number of entries of an observation, by name if goals or images are separate."""
+"""Number of entries of an observation, or numbers by name if goals or images are separate."""
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
     """Load the policy in a checkpoint of this package or of Stable-Baselines3.
 
-    Its weights are read; pickles in the file are loaded only if they are needed, with `trust`.
+    The weights are read without unpickling. Pickles in the file are loaded only if they are needed
+    and `trust` is set.
 
     Raises:
         CheckpointError: the checkpoint is of another version or for another environment, or
@@ -52,10 +53,11 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def read_meta(path: Path) -> dict[str, Any]:
-    """Return the metadata in a checkpoint; they are empty for a file of Stable-Baselines3.
+    """Return the metadata in a checkpoint, or an empty dict for a file of Stable-Baselines3.
 
     Raises:
-        CheckpointError: the file does not exist, or is neither of the two.
+        CheckpointError: the file does not exist, or is neither a checkpoint of this package nor a
+            file of Stable-Baselines3.
     """
     try:
         return describe(path)
@@ -78,7 +80,7 @@ def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
 
 
 def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
-    """Raise `CheckpointError` if a checkpoint is of another version or has other sizes."""
+    """Raise `CheckpointError` if a checkpoint's version, or a size of its spaces, differs."""
     made_with = meta["hrc_env"]
     if made_with.split(".")[:2] != __version__.split(".")[:2]:
         raise CheckpointError(

@@ -1,4 +1,4 @@
-"""Training callbacks: ramp of the safety term, progress, curves, checkpoints and Ctrl-C."""
+"""Training callbacks: safety ramp, progress display, learning curves, checkpoints and Ctrl-C."""
 
 import json
 import signal
@@ -28,17 +28,17 @@ from . import checkpoints
 from .ppo_lagrangian import PPOLagrangian
 
 RECENT_EPISODES = 64
-"""Number of finished episodes over which curves average."""
+"""Number of most recent finished episodes over which learning curves are averaged."""
 SAVE_EVERY_S = 60.0
 """Time between checkpoints [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """A share that grows linearly from 0 to 1."""
+    """A factor that grows linearly from 0 to 1 over the training."""
 
     n_steps: int
-    """Number of environment steps until the share is 1; with 0, it is 1 from the start."""
+    """Number of environment steps until the factor is 1; with 0, it is 1 from the start."""
 
     def __post_init__(self) -> None:
         if self.n_steps < 0:
@@ -47,7 +47,7 @@ class Ramp:
             )
 
     def at(self, n_steps: int) -> float:
-        """Return the share in [0, 1] after a number of environment steps."""
+        """Return the factor in [0, 1] after a number of environment steps."""
         return 1.0 if n_steps >= self.n_steps else n_steps / self.n_steps
 
 
@@ -127,8 +127,8 @@ class Interrupt:
             signal.signal(signal.SIGINT, self._before)
 
     def listen(self) -> None:
-        """Begin to handle Ctrl-C."""
-        if threading.current_thread() is threading.main_thread():  # other threads get no signals
+        """Install the handler for Ctrl-C (SIGINT)."""
+        if threading.current_thread() is threading.main_thread():  # only there
             self._before = signal.signal(signal.SIGINT, self._answer)
 
     def _answer(self, number: int, frame: FrameType | None) -> None:
@@ -147,7 +147,7 @@ LEAST_STEPS = 2048
 
 
 class TrainingLog:
-    """The curve of a run, its checkpoints, and its progress display.
+    """The learning curve, checkpoints and progress display of a training run.
 
     Args:
         learner: learner of Stable-Baselines3, whose logger writes to TensorBoard.
@@ -167,14 +167,15 @@ class TrainingLog:
         self.begin()
 
     def begin(self) -> None:
-        """Start the clock of the curve and of checkpoints."""
+        """Start the timer of the learning curve and of the checkpoints."""
         self.started_s = self.saved_s = time.monotonic()
 
     def note(self, weights: dict[str, float]) -> None:
-        """Add a point to the curve if an episode has ended, and show the progress.
+        """Add a point to the learning curve if an episode has ended, and show the progress.
 
         Args:
-            weights: weights in the last rollout, by their name in the curve.
+            weights: weights of reward and cost terms in the last rollout, by their name in the
+                curve.
         """
         n_steps, note = self.learner.num_timesteps, ""
         if self.recent:
@@ -194,14 +195,14 @@ class TrainingLog:
         return time.monotonic() - self.saved_s > SAVE_EVERY_S
 
     def save(self) -> None:
-        """Write the checkpoint and the curve."""
+        """Write the checkpoint and the learning curve."""
         self.saved_s = time.monotonic()
         checkpoints.save(self.learner, self.folder / "policy.zip", self.facts)
         write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
 
 
 class TrainingMonitor(BaseCallback):
-    """Logs a training by Stable-Baselines3, with a checkpoint every minute and at the end.
+    """Callback that logs a training run and saves a checkpoint every minute and at the end.
 
     Ctrl-C ends the training after the current step.
     """

@@ -26,16 +26,17 @@ with learner():
     from stable_baselines3.common.vec_env import VecNormalize
 
 KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
-"""Classes of learners by algorithm."""
+"""Learner classes of Stable-Baselines3, by the name of the algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
 """Arguments for loading a learner without its replay buffer, for acting only."""
 Learner: TypeAlias = "PPO | SAC"
 
 
 def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
-    """Write a checkpoint: the learner, the scale of rewards, and a description of its environment.
+    """Write a checkpoint of a learner, with a description of its environment.
 
-    An interrupted write leaves no partial file, since a complete temporary file is renamed.
+    The checkpoint includes the reward-normalization statistics. It is written to a temporary file,
+    which is then renamed; an interrupted write leaves no partial checkpoint.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.zip")
@@ -64,10 +65,10 @@ def get_algorithm(learner: Learner) -> str:
 
 
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
-    """Load the learner of a checkpoint to continue its training on `env`.
+    """Load the learner of a checkpoint to continue its training in `env`.
 
-    PPO keeps its scale of rewards. SAC first refills its replay buffer with actions of its policy,
-    and continues to learn when the buffer holds an episode of every environment.
+    PPO keeps its reward-normalization statistics. SAC first refills its replay buffer by acting
+    with its policy, and continues to learn when the buffer holds one episode of each environment.
 
     Raises:
         CheckpointError: the checkpoint is of another version or for another environment.
@@ -91,9 +92,10 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """Load a trained policy for acting, with its learner.
+    """Load a trained policy for acting, together with its learner.
 
-    The learner is unpickled, which can execute code from the file: use it for your own runs only.
+    The learner is unpickled, which can execute code from the file: load only checkpoints that you
+    trust.
 
     Raises:
         CheckpointError: the checkpoint is of another version or for another environment.

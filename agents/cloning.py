@@ -1,9 +1,9 @@
-"""Behaviour cloning: a policy learns the scripted agent's actions in states that it reaches itself.
+"""Behaviour cloning of the scripted agent, in states that the policy itself reaches (DAgger).
 
-Scripted agents have no memory and can be queried for any observation, which permits rounds of
-DAgger (Ross et al. 2011, arXiv:1011.0686). Policy and expert take turns in acting, to also reach
-late parts of an episode. In the first round the expert acts alone, with occasional disturbances.
-Targets are always the expert's actions.
+Scripted agents have no memory and can be queried for any observation, as DAgger requires (Ross et
+al. 2011, arXiv:1011.0686). Policy and expert take turns in acting, so that the demonstrations
+include late parts of an episode. In the first round the expert acts alone, with occasional
+disturbances. The training targets are always the expert's actions.
 """
 
 import math
@@ -26,32 +26,32 @@ with learner():
 
 Arrays = dict[str, NDArray[np.float32]]
 LEAST_SPREAD = 0.05
-"""Minimum standard deviation of a policy's actions after cloning."""
+"""Minimum standard deviation of the policy's action distribution after cloning."""
 FLAT = ""
-"""Name of an observation without parts."""
+"""Key of an observation that is a single array."""
 
 
 class Demonstrations(NamedTuple):
-    """Observations, with the actions of the expert for them."""
+    """Observations and the expert's actions for them."""
 
     observations: Arrays
-    """Observations (N, ...) by part."""
+    """Observations (N, ...) by the name of their part."""
     actions: NDArray[np.float32]
     """Actions of the expert (N, A)."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloningSettings:
-    """Amount of demonstrations, and settings of the optimization."""
+    """Settings of behaviour cloning: rounds, optimizer, and how policy and expert alternate."""
 
     rounds: int = 4
-    """Number of rounds, each of collecting demonstrations and learning from them."""
+    """Number of rounds; each one collects demonstrations and trains on all of them."""
     steps: int = 2000
-    """Gradient steps per round on all demonstrations; the last round has three times as many."""
+    """Number of gradient steps per round; the last round has three times as many."""
     batch_size: int = 256
     """Number of observations in a gradient step."""
     learning_rate: float = 1e-3
-    """Step size of Adam, which falls to 0 within each round."""
+    """Learning rate of Adam, which decreases to 0 within each round."""
     stretch: float = 25.0
     """Mean number of steps after which policy and expert take turns in an environment."""
     disturbance: float = 0.3
@@ -67,17 +67,17 @@ def clone(
     seed: int,
     tick: Callable[[float], None] = lambda share: None,
 ) -> list[float]:
-    """Train a policy to imitate the task's scripted agent; return the errors per round.
+    """Train a policy to imitate the task's scripted agent; return the error of each round.
 
     The scripted agent does not slow down near people.
 
     Args:
-        policy: policy of a learner of Stable-Baselines3; its mean action is trained.
+        policy: policy of a learner of Stable-Baselines3, the mean action of which is trained.
         env: environments for the demonstrations; they are seeded and reset.
         n_episodes: number of episodes of full length, over all rounds.
         settings: settings of the training.
         seed: seed of episodes, disturbances and batches.
-        tick: function that is called with each increase of the completed share.
+        tick: function that is called with the increase of the completed fraction.
 
     Returns:
         Mean error of actions after each round.
@@ -103,7 +103,7 @@ def clone(
             tick(1 / (settings.rounds * n_steps))
         n = settings.steps if k < settings.rounds - 1 else 3 * settings.steps
         errors.append(_learn(policy, _stack(shown), n, settings, rng))
-    if isinstance(policy, ActorCriticPolicy):  # exploration is no larger than the error
+    if isinstance(policy, ActorCriticPolicy):  # the exploration noise is no larger than the error
         policy.log_std.data.fill_(math.log(max(errors[-1], LEAST_SPREAD)))
     return errors
 
@@ -115,7 +115,7 @@ def _learn(
     settings: CloningSettings,
     rng: np.random.Generator,
 ) -> float:
-    """Fit the mean action; return its mean error in the last tenth of the gradient steps."""
+    """Fit the policy's mean action; return its mean error over the last tenth of the steps."""
     targets = shown.actions
     optimiser = torch.optim.Adam(policy.parameters(), settings.learning_rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, n_steps)

@@ -1,11 +1,11 @@
-"""Scripted delivery by a mobile base, decided from the observation and the map alone.
+"""Scripted delivery by a mobile base, which uses only the observation and the map.
 
-The route descends a field of path lengths to the zone (Dijkstra), in which ground near standing
-people is expensive. Fields are cached, since they change only when a person stops or starts
-walking. Velocities are chosen as in a dynamic window (Fox, Burgard and Thrun 1997,
-doi:10.1109/100.580977), by their positions in the next two seconds: path length, and clearance to
-obstacles and to the predicted positions of people. The base drives around people who stand and wait
-for it, to avoid a deadlock.
+The route descends a cost-to-go field of path lengths to the zone (Dijkstra), in which cells near
+standing people have a higher cost. Fields are cached, since they change only when a person stops or
+starts walking. Velocities are chosen as in the dynamic window approach (Fox, Burgard and Thrun
+1997, doi:10.1109/100.580977): each candidate is scored by the positions that it reaches in the next
+two seconds, from their path length and their clearance to obstacles and to the predicted positions
+of people. The base drives around people who stand and wait for it, to avoid a deadlock.
 """
 
 from typing import NamedTuple
@@ -23,49 +23,60 @@ from .scripted import Yielding
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 CELL_M = 0.2
-"""Cell size of the fields [m]."""
+"""Cell size of the cost-to-go fields [m]."""
 BEYOND_M = 3.0
-"""Margin of the fields beyond the area where people walk [m]."""
+"""Margin of the cost-to-go fields around the area where people walk [m]."""
 FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
-"""Clearance of free ground, minimum clearance of a route [m], and cost factor between the two."""
+"""Clearance above which ground is free [m], minimum clearance of a route [m], and cost factor for
+clearances between the two.
+"""
 BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
 """Radii of a person, of the base in any orientation, and of two discs that contain it [m].
 
 The discs are `DISC_AT_M` ahead of and behind the centre of the base.
 """
 STANDS_M_S, STOOD_M, STOOD_DEAR, SPOT_M = 0.25, 1.1, 6.0, 0.4
-"""Speed below which a person stands [m/s]; radius [m] and factor of expensive ground around them.
+"""Speed below which a person counts as standing [m/s], radius around them within which ground has a
+higher cost [m], factor on this cost, and resolution of their position [m].
 
 Positions of standing people are rounded to multiples of `SPOT_M`.
 """
 BRAKE_M_S2, GONE_S, KEEP_M = 1.5, 0.3, 0.2
-"""Parameters of the speed limit towards a person: sqrt(2 a (gap - 0.3 s v - 0.2 m)).
+"""Parameters of the maximum speed towards a person, sqrt(2 a (gap - GONE_S v - KEEP_M)).
 
-Here a is the deceleration and v the person's speed.
+Here a is the deceleration `BRAKE_M_S2` and v the person's speed.
 """
 SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
 """Speeds of the candidate velocities [m/s], and number of their headings."""
 TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
 """Times after which candidate velocities are evaluated [s]."""
 NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
-"""Distance below which the zone is approached straight [m], gain [1/s], stopping distance [m]."""
+"""Distance below which the base drives straight to the zone [m], gain of this approach [1/s], and
+distance below which it stops [m].
+"""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
-"""Clearance to people without a cost [m], and costs relative to a metre of the route."""
+"""Clearance to people above which there is no cost [m], and weights of the costs, relative to a
+metre of the route.
+"""
 BESIDE_M, NEAR_PRICE = 0.25, 4.0
-"""Additional clearance to obstacles [m], and the cost of a smaller one.
+"""Additional clearance to obstacles [m], and weight of the cost of a smaller one.
 
-It leaves room for the errors of a policy that imitates this agent.
+This clearance allows for the errors of a policy that imitates this agent.
 """
 SLOW_M_S, STAY_M = 0.2, 0.25
-"""Speed below which the base turns along the route [m/s], if no person is within `STAY_M` [m]."""
+"""Speed below which the base turns along the route [m/s], and separation from workers below which
+it does not turn at such speeds [m].
+"""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
-"""Cost of a change of velocity, gain of turns [1/s], and maximum turn rate [rad/s]."""
+"""Weight of the cost of a change of velocity [s], gain of turns [1/s], and maximum turn rate
+[rad/s].
+"""
 FIELDS = 1024
-"""Number of cached fields."""
+"""Number of cost-to-go fields in the cache."""
 
 
 class People(NamedTuple):
-    """Estimated workers; those that are not tracked are far away."""
+    """Estimated workers relative to each base; untracked ones get a position far away."""
 
     position: Array
     """Horizontal positions relative to the base (n, W, 2) [m]."""
@@ -74,18 +85,18 @@ class People(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a grid that contain positions, and the offsets within them."""
+    """Indices of the grid cells that contain some positions, and the offsets within the cells."""
 
     i: Indices
     j: Indices
     u: Array
-    """Share of a cell along the first axis."""
+    """Offset along the first axis, as a fraction of the cell size."""
     v: Array
-    """Share of a cell along the second axis."""
+    """Offset along the second axis, as a fraction of the cell size."""
 
 
 class Deliverer:
-    """An agent that drives by a route and a dynamic window, and can slow down near people."""
+    """An agent that drives along a planned route and can slow down near people."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
@@ -131,7 +142,7 @@ class Deliverer:
         return action.reshape(*shape, -1).astype(np.float32)
 
     def _find_fields(self, place: Array, zone: Array, people: People) -> Indices:
-        """Return the index (n,) of the cached field for the zone and the people of each base."""
+        """Return the indices (n,) of the cached fields for each base's zone and standing people."""
         stands = np.linalg.norm(people.velocity, axis=-1) < STANDS_M_S
         spots = np.rint((place[:, None] + people.position) / SPOT_M)
         rows = np.empty(len(place), np.int64)
@@ -145,7 +156,10 @@ class Deliverer:
         return rows
 
     def _make_field(self, key: tuple[tuple[int, int], ...]) -> int:
-        """Compute a field in place of the least recently used one; return its index."""
+        """Compute a field, which replaces the least recently used one in a full cache.
+
+        The result is the field's index.
+        """
         row = len(self._rows)
         if row == len(self._fields):
             row = self._rows.pop(next(iter(self._rows)))
@@ -185,7 +199,7 @@ class Deliverer:
         return np.where((away_m < STOP_M)[:, None], 0.0, best)
 
     def _get_lengths(self, field: Indices, at: Array) -> Array:
-        """Return lengths of the routes (n, C) from positions (n, C, 2) [m]."""
+        """Return the path costs (n, C) from positions (n, C, 2) to the zone [m]."""
         i, j, u, v = self._locate(at)
         k = field[:, None]
         low = self._fields[k, i, j] * (1 - v) + self._fields[k, i, j + 1] * v
@@ -206,7 +220,7 @@ class Deliverer:
         return Cells(low[..., 0], low[..., 1], share[..., 0], share[..., 1])
 
     def _compute_turn(self, place: Array, yaw: Array, towards: Array) -> Array:
-        """Return turn rates (n,) [rad/s] towards directions (n, 2), or 0 without room to turn."""
+        """Return turn rates (n,) towards directions (n, 2) [rad/s], or 0 where there is no room."""
         wanted = np.arctan2(towards[:, 1], towards[:, 0])
         error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
         rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
@@ -221,7 +235,7 @@ class Deliverer:
 
 
 def _read_people(terms: dict[str, Array]) -> People:
-    """Return the estimated workers in observations."""
+    """Extract the estimated workers from the terms of an observation."""
     n = len(terms["way_left"])
     joints = terms["worker_joints_from_tool"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     moving = terms["worker_joints_velocity"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)

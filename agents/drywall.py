@@ -1,6 +1,6 @@
-"""Scripted holding of a drywall board, decided from the observation alone.
+"""Scripted holding of a drywall board, which uses only the observation.
 
-The suction cups move above the board, descend onto it, and suck. The board is lifted and set
+The suction cups move above the board, descend onto it, and grip it. The board is lifted and set
 upright, carried around the robot to a point in front of its target, and pressed against the studs
 until it is fixed.
 """
@@ -18,31 +18,42 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
-"""Offsets of the board's face, and of the cups across and along it, from its centre [m]."""
+"""Offset of the board's face from its centre, and offsets of the suction cups across and along the
+board [m].
+"""
 ABOVE_M, SUCK_M = 0.12, 0.05
-"""Height at which the cups travel above the board, and distance below which they suck [m]."""
+"""Height above the board at which the suction cups travel, and distance below which suction is
+switched on [m].
+"""
 OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.015, 0.05, 0.03, 0.2
-"""Errors below which the cups descend, and widths of a funnel above these [m, rad].
+"""Position and angle errors below which the cups descend onto the board [m, rad], and widths of the
+funnel beyond these errors [m, rad].
 
 Within the funnel, the height grows with the error, which keeps a policy that imitates this agent
 from hesitating at one height.
 """
 PRESS_M = 0.02
-"""Depth below the board's surface to which the cups are commanded [m]."""
+"""Depth below the board's surface of the suction cups' target [m]."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
-"""Heights above the robot's base between which the board is set upright [m]."""
+"""Heights relative to the robot's base between which the board is turned upright [m]."""
 NEAR_M, FAR_M = 0.72, 1.0
-"""Distance of the board from the robot's axis when it is upright, and on the stack [m]."""
+"""Distances of the board from the robot's vertical axis when it is upright and on the stack [m]."""
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
-"""Distance in front of its target at which the board is aligned, and maximum errors [m, rad]."""
+"""Distance in front of the target at which the board is aligned [m], and maximum errors of an
+aligned board [m, rad].
+"""
 STAYS = 3.0
-"""Factor on `ALIGNED_M` and `ALIGNED_RAD` below which a board remains aligned at the end."""
+"""Factor on `ALIGNED_M` and `ALIGNED_RAD` for a board on its way to the studs, which still counts
+as aligned within these wider limits.
+"""
 THERE_M = np.array([0.003, 0.0, 0.003])
-"""Errors along the axes below which the board is held still, to ignore noise [m]."""
+"""Position errors along x, y and z below which the board is held still [m]; smaller errors are
+noise.
+"""
 CORNER_M = 0.86
 """Distance of the board's farthest corner from the centre of the cups [m]."""
 LAST_RAD = 0.25
-"""Last angle of the path around the robot, within which the board moves straight [rad]."""
+"""Angle from the target around the robot below which the board moves in a straight line [rad]."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
 """Maximum speeds with the board and against the studs [m/s]; maximum turn rate [rad/s]."""
 STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)
@@ -57,17 +68,17 @@ class ToolAxes(NamedTuple):
 
 
 class Fetch(NamedTuple):
-    """The motion that fetches the board."""
+    """Motion of the tool while it fetches the board."""
 
     velocity: Array
     """Velocity of the tool (n, 3) [m/s]."""
     axes: ToolAxes
     near: NDArray[np.bool_]
-    """Whether the cups are close to the board (n,)."""
+    """Mask (n,) of environments in which the suction cups are close to the board."""
 
 
 class Bring(NamedTuple):
-    """The motion while the board is held."""
+    """Motion of the tool while it holds the board."""
 
     velocity: Array
     """Velocity of the tool (n, 3) [m/s]."""
@@ -75,14 +86,14 @@ class Bring(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The motion of the tool."""
+    """Planned motion of the tool and state of its suction cups."""
 
     velocity: Array
-    """Velocity (n, 3) [m/s]."""
+    """Velocity of the tool's origin (n, 3) [m/s]."""
     turn: Array
-    """Angular velocity (n, 3) [rad/s]."""
+    """Angular velocity of the tool (n, 3) [rad/s]."""
     sucks: NDArray[np.bool_]
-    """Whether the cups suck (n,)."""
+    """Mask (n,) of environments in which suction is on."""
 
 
 class BoardHolder:
@@ -158,7 +169,7 @@ class BoardHolder:
         return Bring(velocity, axes)
 
     def _carry(self, board: Array, angle: Array, height: Array, share: Array) -> Array:
-        """Return the velocity (n, 3) that lifts the board off the stack, then around the robot."""
+        """Return the velocity (n, 3) that lifts the board and carries it around the robot."""
         radius = np.linalg.norm(board[:, :2], axis=1)
         outward = board[:, :2] / np.maximum(radius, 1e-6)[:, None]
         aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
@@ -171,7 +182,7 @@ class BoardHolder:
 
 
 def _press(terms: dict[str, Array], to_place: Array) -> Array:
-    """Return the velocity (n, 3) to a point in front of the target, or to the studs if aligned."""
+    """Return the velocity (n, 3) to a point before the target or, once aligned, to the studs."""
     aligned, before = _is_aligned(terms), to_place - [0.0, BEFORE_M, 0.0]
     left = np.sign(to_place) * np.maximum(np.abs(to_place) - THERE_M, 0.0)
     error = np.where(aligned[:, None], left, before)
@@ -192,7 +203,7 @@ def _is_aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
 
 
 def _is_pressing(terms: dict[str, Array]) -> NDArray[np.bool_]:
-    """Return a mask (n,) of boards at their target, where people work and they must not move."""
+    """Return a mask (n,) of boards that are pressed at their target while people work on them."""
     return (terms["object_held"][:, 0] > 0.5) & (
         np.linalg.norm(terms["place_from_object"], axis=1) < 0.02
     )

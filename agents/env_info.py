@@ -1,4 +1,4 @@
-"""The protocol of agents, and the information that they receive about an environment."""
+"""The interface of agents, and the information that they receive about an environment."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -22,30 +22,30 @@ Observation = NDArray[np.float32] | Mapping[str, NDArray[np.float32]]
 
 
 class Agent(Protocol):
-    """A policy; `act` is its only required method."""
+    """Interface of a policy; `act` is its only required method."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return actions (..., A) in [-1, 1] for observations (..., n).
 
-        Observations are of one environment or of many; `EnvInfo.split` returns their terms.
+        Observations come from one or several environments. `EnvInfo.split` splits them into terms.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EnvInfo:
-    """Information that an agent receives in advance: the robot and the layout of observations."""
+    """Information that an agent receives in advance: robot, actions, observations and map."""
 
     layout: ObservationLayout
-    """Entries of an observation by term, and their scales."""
+    """Layout of the observation: the entries of each term, and their scales."""
     chain: SerialChain
     """Kinematic chain of the robot, from its base to its tool."""
     home_q: NDArray[np.float64]
     """Rest configuration of the robot (N,) [rad; slides: m]."""
     control: str
-    """Meaning of an action: "joint", "tool" or "twist"."""
+    """Control mode, which defines the meaning of actions: "joint", "tool" or "twist"."""
     control_config: ControlConfig
-    """Velocities to which actions of 1 correspond."""
+    """Configuration of the control, with the velocities to which actions of 1 correspond."""
     n_actions: int
     """Number of entries of an action."""
     task: str
@@ -53,14 +53,14 @@ class EnvInfo:
     map: Grounds
     """Map of the scene: obstacles, and areas where people walk and work."""
     goal_size: int = 0
-    """Number of entries of a goal that is separate from the observation; 0 if there is none."""
+    """Number of entries of a goal that is separate from the observation, or 0 if there is none."""
     images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
-    """Height, width and channels of images beside the observation, by name."""
+    """Shapes (height, width, channels) of the images in an observation, by name."""
 
     def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
         """Return the terms of an observation by name, in metres, seconds and radians.
 
-        Goals and images are included.
+        The result includes separate goals and images.
 
         Args:
             observation: array (..., n), or arrays by name.

@@ -1,4 +1,4 @@
-"""Scripted agents by task."""
+"""Scripted agents (experts) for the built-in tasks."""
 
 from collections.abc import Callable
 
@@ -35,13 +35,13 @@ def read_pick_place_goal(terms: Terms) -> Terms:
 
 
 class GoalReader:
-    """A scripted agent for tasks with goals that are separate from the observation."""
+    """Wrapper of a scripted agent for tasks with goals that are separate from the observation."""
 
     def __init__(self, expert: Reacher | PickPlacer, read: Callable[[Terms], Terms]) -> None:
         self.expert, self.read = expert, read
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return the actions (..., A) of the expert."""
+        """Return the actions (..., A) of the scripted agent."""
         terms = split(observation, self.expert.env_info.layout)
         return self.expert.act_on({**terms, **self.read(terms)})
 
@@ -55,7 +55,7 @@ EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCReachGoal-v0": lambda info, y: GoalReader(Reacher(info, y), read_reach_goal),
     "HRCPickPlaceGoal-v0": lambda info, y: GoalReader(PickPlacer(info, y), read_pick_place_goal),
 }
-"""Factories of scripted agents by task."""
+"""Functions that create the scripted agents, by the id of their task."""
 
 
 def make_expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:

@@ -1,4 +1,4 @@
-"""Export of a run's policy as files that execute no code, with a card of its scores."""
+"""Export of a run's policy as weights, which load without executing code, and a card."""
 
 import hashlib
 import json
@@ -35,13 +35,13 @@ with learner():
     from stable_baselines3 import SAC
 
 LEFT_OUT = {*ONLY_OF_A_RUN} - {"timesteps", "engine", "workers"}
-"""Arguments of a run on which the policy does not depend."""
+"""Names of the arguments of a run that do not affect its policy."""
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
-"""Names of activation functions."""
+"""Names of activation functions in an exported policy, by their class."""
 
 
 class ExportedNetwork(NamedTuple):
-    """Weights and structure of a policy's network."""
+    """Weights and architecture of a policy's network."""
 
     tensors: Tensors
     architecture: Architecture
@@ -87,7 +87,7 @@ def run(request: ExportRequest) -> int:
 
 
 def extract_network(trained: checkpoints.Learner) -> ExportedNetwork:
-    """Return the network of a learner that computes actions.
+    """Return the part of a learner's network that computes actions.
 
     Raises:
         CheckpointError: the network uses images; the format has no convolutions.
@@ -115,7 +115,7 @@ def extract_network(trained: checkpoints.Learner) -> ExportedNetwork:
 
 
 def format_command(arguments: TrainingRequest) -> str:
-    """Return the command line of a training."""
+    """Return the command line that reproduces a training run."""
     words = ["python", "-m", "hrc_env", "train"]
     for field in fields(TrainingRequest):
         value = getattr(arguments, field.name)
@@ -140,7 +140,7 @@ def _evaluate(
     kwargs: Mapping[str, Any],
     console: Console,
 ) -> Worth:
-    """Evaluate a policy on the fixed evaluation seeds, and print its scores."""
+    """Evaluate a policy on the fixed evaluation seeds; print and return its scores."""
     with progress_bar(console, f"evaluating, shield {shield}") as say:
         episodes = play_episodes(
             lambda _: network, request.episodes, tick=lambda share: say(share, ""),

@@ -1,4 +1,4 @@
-"""Features of observations for policies, with every entry at two scales."""
+"""Feature extractor that represents each entry of an observation at two scales."""
 
 import math
 from typing import Any
@@ -19,9 +19,9 @@ with learner():
 class NearAndFar(BaseFeaturesExtractor):
     """Feature extractor that returns each entry x and sign(x) log(1 + NEAR |x|) / log(1 + NEAR).
 
-    The features let a network with inputs in metres place objects to millimetres. Parts of an
-    observation are concatenated in their order; if goals are separate, the difference between
-    desired and achieved goal is appended.
+    With these features, a network with inputs in metres can position objects to within millimetres.
+    Parts of an observation are concatenated in their order; if goals are separate, the difference
+    between desired and achieved goal is appended.
     """
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:

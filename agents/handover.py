@@ -1,4 +1,4 @@
-"""Scripted handover of a tool, decided from the observation alone.
+"""Scripted handover of a tool, which uses only the observation.
 
 The fingers move in front of the tool, approach it, close, and lift it. They bring its handle to the
 estimated position of a worker's hand, wait until the worker takes it, open and retreat.
@@ -18,55 +18,64 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 GRIP_UP_M, HANDLE_UP_M, HAND_M = -0.08, 0.12, 0.09
-"""Heights of grip and handle above the tool's centre; distance of a hand beyond its wrist [m]."""
+"""Heights of the grasp point and of the handle above the tool's centre, and distance of a hand
+beyond its wrist [m].
+"""
 BEFORE_M, LEVEL_M, AT_M, STILL_AT_M = 0.12, 0.008, 0.010, 0.018
-"""Distance in front of the tool at which the fingers align; errors below which they are aligned,
-close, and stay closed [m]."""
+"""Distance in front of the tool at which the fingers align, error below which they are aligned, and
+distances below which they close and stay closed [m].
+"""
 TOOL_M = 0.20
 """Distance of the tool's farthest end from the fingers [m]."""
 STAND_M, LIFTED_M = (0.30, -0.62, 0.10), 0.08
-"""Position of the tool on its stand, relative to the robot's base; height above it from which the
-tool may move sideways [m]."""
+"""Position of the tool on its stand, relative to the robot's base, and height above it from which
+the tool may move sideways [m].
+"""
 ROUND_M = 0.58
 """Radius of the circle around the robot on which the fingers travel [m]."""
 TURN_RAD_S, FAST_M_S, BRING_M_S, OFFER_M_S = 1.1, 0.5, 0.35, 0.15
-"""Maximum turn rate; maximum speeds without the tool, with it, and close to the hand."""
+"""Maximum turn rate [rad/s], and maximum speeds without the tool, with it, and close to the hand
+[m/s].
+"""
 OFFERED_M = 0.05
 """Distance to the estimated hand below which the handle is held still for the worker [m]."""
 NEAR_M, REACH_M, HIGH_M = 0.35, 1.0, 0.15
-"""Distance to the hand below which the handle moves slowly; maximum distance of hands from the
-robot's axis, and their minimum height above its base [m]."""
+"""Distance to the hand below which the handle moves slowly, maximum distance of hands from the
+robot's vertical axis, and their minimum height above its base [m].
+"""
 WAIT_M, BACK_M = (0.58, 0.0, 0.30), 0.30
-"""Waiting position of the tool relative to the robot's base; length of the retreat [m]."""
+"""Position relative to the robot's base at which the tool waits for a hand, and length of the
+retreat [m].
+"""
 
 
 class Fetch(NamedTuple):
-    """The motion that fetches the tool."""
+    """Motion of the fingers while they fetch the tool."""
 
     velocity: Array
     """Velocity of the fingers (n, 3) [m/s]."""
     closes: NDArray[np.bool_]
-    """Whether the fingers close (n,)."""
+    """Mask (n,) of environments in which the fingers close."""
     heading: Array
-    """Direction of the fingers (n, 3)."""
+    """Desired pointing direction of the fingers, a horizontal unit vector (n, 3)."""
 
 
 class Bring(NamedTuple):
-    """The motion while the tool is held."""
+    """Motion of the fingers while they hold the tool."""
 
     velocity: Array
     """Velocity of the fingers (n, 3) [m/s]."""
     heading: Array
-    """Direction of the fingers (n, 3)."""
+    """Desired pointing direction of the fingers, a horizontal unit vector (n, 3)."""
 
 
 class Hand(NamedTuple):
-    """The nearest hand that is held out."""
+    """The nearest hand that a worker holds out, for each environment."""
 
     position: Array
     """Position relative to the robot's base (n, 3) [m]."""
     is_out: NDArray[np.bool_]
-    """Whether a hand is held out (n,)."""
+    """Mask (n,) of environments in which a worker holds out a hand."""
 
 
 class Bringer:
@@ -160,11 +169,11 @@ def _approach(way: Array, most_m_s: float) -> Array:
 
 
 def _flatten(way: Array) -> Array:
-    """Return the horizontal unit vectors (n, 3) in the directions of vectors (n, 3)."""
+    """Project vectors (n, 3) onto the horizontal plane and normalize them."""
     level = way * [1.0, 1.0, 0.0]
     return level / np.maximum(np.linalg.norm(level, axis=1, keepdims=True), 1e-9)
 
 
 def _rotate_left(heading: Array) -> Array:
-    """Return horizontal vectors (n, 3), rotated by 90 degrees to the left."""
+    """Rotate horizontal vectors (n, 3) by 90 degrees to the left."""
     return np.stack([-heading[:, 1], heading[:, 0], np.zeros(len(heading))], axis=1)

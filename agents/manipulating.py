@@ -1,4 +1,4 @@
-"""Functions of scripted manipulation, from targets of the tool to actions."""
+"""Functions for scripted manipulation that convert targets of the tool to actions."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,11 @@ Array = NDArray[np.float64]
 ROUND_RAD = 0.35
 """Angle around the robot beyond which a target is approached along a circle [rad]."""
 TURN_HZ = 4.0
-"""Gain of turns: turn rate per angle [1/s]."""
+"""Proportional gain of turns: turn rate per angle error [1/s]."""
 
 
 def plan_around_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float) -> Array:
-    """Return displacements to targets, along a circle if they are far around the robot.
+    """Plan displacements to targets, along a circle around the robot if their angle is large.
 
     Args:
         tool: position of the tool (n, 3) [m].
@@ -24,7 +24,7 @@ def plan_around_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float
         radius_m: maximum radius of the circle [m].
 
     Returns:
-        Displacements of the tool (n, 3) [m]; those to other targets are straight.
+        Displacements of the tool (n, 3) [m]; targets within `ROUND_RAD` are approached straight.
     """
     here, there = tool[:, :2] - foot_xy, tool[:, :2] + target[:, :2] - foot_xy
     radius, wanted = np.linalg.norm(here, axis=1), np.linalg.norm(there, axis=1)
@@ -58,7 +58,7 @@ def turn_towards(tool_axes: Array, x: Array, z: Array, most_rad_s: float) -> Arr
 def make_arm_action(
     env_info: EnvInfo, terms: dict[str, Array], velocity: Array, turn: Array
 ) -> Array:
-    """Return the arm's part (n, A - 1) of actions for a motion of the tool.
+    """Return the arm's entries (n, A - 1) of actions for a motion of the tool.
 
     Args:
         env_info: information about the environment.

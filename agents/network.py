@@ -1,4 +1,4 @@
-"""Networks of trained policies in NumPy, for acting without a learner."""
+"""Policy networks in NumPy, for acting without a learner."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from hrc_env.tasks.goal import ACHIEVED, DESIRED
 from .env_info import Observation
 
 NEAR = 100.0
-"""Factor of the near scale, which spreads out entries below 1 / NEAR."""
+"""Factor of the near scale, which resolves entries of magnitude below 1 / NEAR."""
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 """Activation functions by name."""
 Tensors = dict[str, NDArray[np.float32]]
@@ -24,12 +24,12 @@ Tensors = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True, slots=True)
 class Architecture:
-    """The structure of a network, without its weights."""
+    """Architecture of a policy's network, without its weights."""
 
     activation: str
-    """Activation after each layer but the last: "tanh" or "relu"."""
+    """Activation function after each layer except the last one: "tanh" or "relu"."""
     near_and_far: bool
-    """Whether each entry of an observation is used at two scales (`agents.features`)."""
+    """Whether each entry of an observation is represented at two scales (`agents.features`)."""
     squashed: bool
     """Whether the last layer's output is squashed by tanh (SAC) instead of clipped to [-1, 1]
     (PPO)."""
@@ -46,10 +46,12 @@ class NetworkSizes(NamedTuple):
 
 
 class Network:
-    """A sequence of layers; layer k has "actor.k.weight" (out, in) and "actor.k.bias" (out,).
+    """A feed-forward network with the tensors "actor.k.weight" and "actor.k.bias" of each layer k.
+
+    Their shapes are (out, in) and (out,).
 
     Raises:
-        KeyError: a layer lacks its weight or bias.
+        KeyError: the weight or the bias of a layer is missing.
     """
 
     def __init__(self, tensors: Tensors, architecture: Architecture) -> None:
@@ -59,7 +61,7 @@ class Network:
 
     @property
     def sizes(self) -> NetworkSizes:
-        """Numbers of inputs and outputs."""
+        """Numbers of inputs and outputs of the network."""
         n_features = self.layers[0][0].shape[1]
         n_inputs = n_features // (2 if self.architecture.near_and_far else 1)
         return NetworkSizes(n_inputs, len(self.layers[-1][1]))
@@ -77,7 +79,10 @@ class Network:
 
 
 def flatten(observation: Observation) -> NDArray[np.float32]:
-    """Return the numbers of an observation (..., n) without images; separate goals come first."""
+    """Concatenate the parts of an observation to an array (..., n), without images.
+
+    Separate goals come first.
+    """
     if isinstance(observation, Mapping):
         numbers = [name for name in sorted(observation) if not name.startswith(IMAGE)]
         return np.concatenate([observation[name] for name in numbers], axis=-1)
@@ -85,7 +90,7 @@ def flatten(observation: Observation) -> NDArray[np.float32]:
 
 
 def expand_near_and_far(observation: Observation) -> NDArray[np.float32]:
-    """Return the features (..., 2 n) of `agents.features.NearAndFar`."""
+    """Return the same features (..., 2 n) as `agents.features.NearAndFar`."""
     x = flatten(observation)
     if isinstance(observation, Mapping) and DESIRED in observation:
         x = np.concatenate([x, observation[DESIRED] - observation[ACHIEVED]], axis=-1)

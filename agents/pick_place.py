@@ -1,8 +1,9 @@
-"""Scripted picking and placing, decided from the observation alone.
+"""Scripted picking and placing, which uses only the observation.
 
-The agent needs no memory. If the fingers hold a piece, they move up, around the robot to a point
-above its target, down, and open. Otherwise, they move above the first piece that is not placed,
-down, and close. `hrc_env.control` converts velocities of the tool to joint velocities.
+The agent needs no memory. If the fingers hold a piece, they lift it, carry it around the robot to a
+point above its target, lower it, and open. Otherwise, they move above the first piece that is not
+yet placed, descend, and close. `hrc_env.control` converts velocities of the tool to joint
+velocities.
 """
 
 from dataclasses import dataclass
@@ -19,35 +20,37 @@ from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 ABOVE_M, CLEAR_M = 0.16, 0.11
-"""Height at which the tool travels above pieces, and minimum height of sideways motion [m]."""
+"""Height above pieces at which the tool travels, and minimum height for sideways motion [m]."""
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
-"""Errors below which the tool starts to descend [m, rad], and below which it continues [m]."""
+"""Horizontal error [m] and angle error [rad] below which the tool starts to descend, and horizontal
+error below which it continues [m].
+"""
 AT_M, STILL_AT_M = 0.007, 0.014
 """Distances to a piece's centre below which the fingers close, and stay closed [m].
 
-At these distances of the piece from its target, they open, and stay open.
+The same distances of a held piece from its target determine when they open and stay open.
 """
 PIECE_M = 0.15
 """Distance of a piece's end from the fingers [m]."""
 LYING = 0.8
-"""Cosine of a piece's tilt below which it lies on its side, and is ignored."""
+"""Cosine of the tilt below which a piece lies on its side; it is then ignored."""
 ROUND_M = 0.50
 """Radius of the circle around the robot on which the tool travels [m].
 
-It leaves the space in front of the robot to people.
+It keeps the tool out of the space in front of the robot, which people use.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class _View:
-    """The parts of observations that the agent uses; rows are environments."""
+    """The quantities of observations that the agent uses, with one row per environment."""
 
     tool: Array
     """Position of the tool (n, 3) [m]."""
     finger_axis: Array
-    """Axis across the fingers (n, 3)."""
+    """Unit vector from one finger to the other (n, 3)."""
     tool_axis: Array
-    """Axis of the tool (n, 3)."""
+    """Approach direction of the tool (n, 3)."""
     opening_m: Array
     """Opening of the fingers (n,) [m]."""
     to_piece: Array
@@ -57,18 +60,18 @@ class _View:
     to_place: Array
     """Target of the piece, relative to the piece (n, 3) [m]."""
     held: NDArray[np.bool_]
-    """Whether the piece is held (n,)."""
+    """Mask (n,) of environments in which the fingers hold the piece."""
     nothing: NDArray[np.bool_]
-    """Whether no piece is left to place (n,)."""
+    """Mask (n,) of environments in which no piece remains to be placed."""
 
 
 class _Plan(NamedTuple):
-    """The motion of the tool."""
+    """Planned motion of the tool and command of its fingers."""
 
     velocity: Array
-    """Velocity (n, 3) [m/s]."""
+    """Velocity of the tool (n, 3) [m/s]."""
     turn: Array
-    """Angular velocity (n, 3) [rad/s]."""
+    """Angular velocity of the tool (n, 3) [rad/s]."""
     grip: Array
     """Command of the fingers (n,): 1 closes, -1 opens."""
 
@@ -124,7 +127,7 @@ class PickPlacer:
         return _Plan(velocity, turn, 2.0 * closed - 1)
 
     def _compute_velocity(self, tool: Array, target: Array) -> Array:
-        """Return velocities (n, 3) of the tool to targets that are relative to it."""
+        """Return velocities (n, 3) of the tool towards targets relative to it [m/s]."""
         error = plan_around_foot(tool, target, self._foot, ROUND_M)
         length = np.linalg.norm(error, axis=1, keepdims=True)
         most = self.env_info.control_config.tool_speed_m_s
@@ -132,7 +135,7 @@ class PickPlacer:
 
 
 def _read_view(terms: dict[str, Array]) -> _View:
-    """Return the parts of observations about the first piece that remains to be placed."""
+    """Extract from observations the quantities of the first piece that remains to be placed."""
     n = len(terms["object_placed"])
     axes = terms["object_axes"].reshape(n, -1, 2, 3)
     to_place = terms["place_from_object"].reshape(n, -1, 3)
@@ -156,13 +159,13 @@ def _read_view(terms: dict[str, Array]) -> _View:
 
 
 def _find_finger_turn(finger_axis: Array, along: Array) -> Array:
-    """Return angles (n,) from -pi/2 to pi/2 that turn the fingers across a piece."""
+    """Return the yaw angles (n,) from -pi/2 to pi/2 that align the fingers across a piece [rad]."""
     across = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
     return _wrap_half_turn(across - np.arctan2(finger_axis[:, 1], finger_axis[:, 0]))
 
 
 def _find_turn_to_y(along: Array) -> Array:
-    """Return angles (n,) from -pi/2 to pi/2 that turn a piece parallel to the y axis."""
+    """Return the yaw angles (n,) from -pi/2 to pi/2 that align a piece with the y axis [rad]."""
     return _wrap_half_turn(np.pi / 2 - np.arctan2(along[:, 1], along[:, 0]))
 
 

@@ -1,8 +1,8 @@
-"""Trained policies as files that execute no code: weights as safetensors, and a card beside them.
+"""Trained policies in files that load without executing code: safetensors weights and a card.
 
-`hrc://HRCReach-v0/NAME` is a policy of the package; NAME.safetensors is a policy that `python -m
-hrc_env export` wrote. The card (NAME.json) describes its environment, its training and its scores,
-and holds the SHA-256 digest of the weights, which is checked when they are loaded.
+`hrc://HRCReach-v0/NAME` is a policy that comes with the package; NAME.safetensors is a policy that
+`python -m hrc_env export` wrote. The card (NAME.json) describes the policy's environment, training
+and scores, and holds the SHA-256 digest of the weights, which is verified when they are loaded.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ from .network import Architecture, Network
 
 PREFIX, SUFFIX = "hrc://", ".safetensors"
 FOLDER = Path(__file__).parent / "pretrained"
-"""Folder of the package's policies, as ID/NAME.safetensors."""
+"""Folder of the policies that come with the package, as ID/NAME.safetensors."""
 EXPORT = "python -m hrc_env export RUN --name NAME"
 
 
@@ -33,19 +33,22 @@ class TermSize:
     name: str
     """Name of the term."""
     entries: int
-    """Number of entries."""
+    """Number of entries of the term."""
     scale: float
     """Physical value that corresponds to 1 in the observation."""
 
 
 @dataclass(frozen=True, slots=True)
 class Worth:
-    """Mean scores of a policy with 95 % intervals, on fixed seeds with deterministic actions."""
+    """Mean scores of a policy with 95 % confidence intervals.
+
+    The episodes have fixed seeds, and actions are deterministic.
+    """
 
     shield: str
     """Name of the shield, or "none"."""
     episodes: int
-    """Number of episodes."""
+    """Number of evaluated episodes."""
     seed: int
     """Seed of the first episode."""
     goals_per_minute: Metric
@@ -58,29 +61,29 @@ class Card:
     """The description of a policy: environment, training and scores."""
 
     task: str
-    """Id of the environment."""
+    """Id of the task."""
     control: str
-    """Meaning of actions: "joint", "tool" or "twist"."""
+    """Control mode, which defines the meaning of actions: "joint", "tool" or "twist"."""
     observation: tuple[TermSize, ...]
-    """Terms of the observation in their order."""
+    """Terms of the observation, in their order."""
     n_actions: int
     """Number of entries of an action."""
     architecture: Architecture
-    """Structure of the network."""
+    """Architecture of the network."""
     command: str
     """Command that trained the policy."""
     seed: int
     """Seed of the training."""
     timesteps: int
-    """Environment steps of the training."""
+    """Number of environment steps of the training."""
     hrc_env: str
-    """Version of the package."""
+    """Version of this package with which the policy was trained."""
     commit: str | None
-    """Git commit of the training, or None if it is unknown."""
+    """Git commit of this package at the training, or None if it is unknown."""
     sha256: str
-    """SHA-256 digest of the file of weights."""
+    """SHA-256 digest of the weights file."""
     worth: tuple[Worth, ...]
-    """Scores at the time of the export, one for each shield."""
+    """Scores from the evaluations of the export, one entry for each shield."""
 
 
 class Policy(NamedTuple):
@@ -91,7 +94,7 @@ class Policy(NamedTuple):
 
 
 def list_names() -> tuple[str, ...]:
-    """Return the names ("hrc://...") of the package's policies."""
+    """Return the names ("hrc://...") of the policies that come with the package."""
     return tuple(
         f"{PREFIX}{path.parent.name}/{path.stem}" for path in sorted(FOLDER.glob(f"*/*{SUFFIX}"))
     )
@@ -166,7 +169,7 @@ def load(path: Path, env_info: EnvInfo) -> Network:
 
 
 def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
-    """Describe each difference between a policy's training environment and another one."""
+    """Describe each difference between a policy's training environment and the given one."""
     texts = [
         f"its {name} is {theirs}, but here it is {ours}"
         for name, theirs, ours in (

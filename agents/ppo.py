@@ -1,8 +1,8 @@
-"""Proximal policy optimization by Stable-Baselines3, with settings for these tasks.
+"""Proximal policy optimization (PPO) by Stable-Baselines3, with settings for the built-in tasks.
 
-Schulman et al. 2017, arXiv:1707.06347. The most important choices are to use no running
-normalization of observations (it inflates nearly constant ones such as ages), a progress term in
-the reward, and many short rollouts at random phases of an episode.
+Schulman et al. 2017, arXiv:1707.06347. The most important choices are a progress term in the
+reward, many short rollouts at random phases of an episode, and no running normalization of
+observations, which would inflate nearly constant entries such as ages of estimates.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def make_learner(
 ) -> PPO:
     """Return a new PPO learner for `env`.
 
-    Rewards are scaled by a running estimate; observations are not changed.
+    Rewards are normalized by running statistics; observations are not changed.
     """
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     log = None if tensorboard is None else str(tensorboard)

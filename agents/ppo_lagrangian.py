@@ -1,9 +1,9 @@
-"""PPO with a cost limit, by Stable-Baselines3's PPO with a modified collection of rollouts.
+"""PPO with a cost limit (PPO-Lagrangian), based on Stable-Baselines3's PPO.
 
-A multiplier weighs the advantage of the cost against that of the reward (Ray et al. 2019,
-"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It is controlled by proportional
-and integral terms of the error (Stooke et al. 2020, arXiv:2007.03964). Costs are those of
-`info["cost"]`, which are computed from the truth.
+A Lagrange multiplier weighs the advantage of the cost against that of the reward (Ray et al. 2019,
+"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It is updated by a PI controller of
+the constraint violation (Stooke et al. 2020, arXiv:2007.03964). Costs are those of `info["cost"]`,
+which are computed from the true state.
 """
 
 import copy
@@ -26,35 +26,34 @@ with learner():
     from stable_baselines3.common.vec_env import VecEnv
 
 CRITIC_RATE, CRITIC_PASSES, CRITIC_BATCH = 1e-3, 4, 1024
-"""Step size of the cost critic, passes over a rollout, and samples in a gradient step."""
+"""Learning rate of the cost critic, passes over a rollout, and samples in a gradient step."""
 
 
 @dataclass(slots=True)
 class Multiplier:
-    """The multiplier lambda = clip(integral + kp error), updated after each rollout.
+    """The Lagrange multiplier lambda = clip(integral + kp error), updated after each rollout.
 
-    The integral changes in proportion to 1 + its value, which reaches lambdas of any size, and
-    reduces large ones as fast as it reached them. It does not change while lambda is at a bound
-    that the error would exceed. The error is limited to 1, since policies take hundreds of rollouts
-    to follow.
+    The rate of change of the integral is proportional to 1 + integral, so that lambda can reach any
+    magnitude and decreases as fast as it grew. The integral does not change while lambda is clipped
+    (anti-windup). The error is limited to 1, since policies take hundreds of rollouts to respond.
     """
 
     limit: float
-    """Limit of the cost of an episode."""
+    """Maximum mean cost of an episode."""
     kp: float = 8.0
     """Gain of the proportional term."""
     ki: float = 0.02
     """Gain of the integral term."""
     smoothing: float = 0.1
-    """Weight of the latest rollout in the smoothed `cost`."""
+    """Weight of the latest rollout in the exponential moving average `cost`."""
     most: float = 20.0
-    """Maximum of lambda."""
+    """Maximum value of lambda."""
     cost: float = float("nan")
-    """Smoothed cost of an episode."""
+    """Exponential moving average of the cost of an episode; NaN before the first rollout."""
     integral: float = 0.0
-    """Integral term."""
+    """Integral term of the controller."""
     value: float = 0.0
-    """The multiplier lambda."""
+    """Current value of the multiplier lambda."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "limit", "smoothing", "most")
@@ -63,8 +62,8 @@ class Multiplier:
         """Update lambda after a rollout.
 
         Args:
-            cost: cost of an episode in the rollout.
-            share: share by which the limit is divided, which makes it wider.
+            cost: mean cost of an episode in the rollout.
+            share: number in (0, 1] by which the limit is divided; smaller numbers relax the limit.
         """
         new = 1.0 if np.isnan(self.cost) else self.smoothing
         self.cost = cost if new == 1.0 else (1 - new) * self.cost + new * cost
@@ -79,12 +78,12 @@ class Multiplier:
 class PPOLagrangian(PPO):
     """PPO with the advantages (A_reward - lambda A_cost) / (1 + lambda), each normalized.
 
-    A separate critic predicts the cost. Its targets are divided by the running standard deviation
-    of the discounted cost, since it would not reach raw ones of 15 to 50.
+    A separate critic predicts the discounted cost. Its targets are divided by their running
+    standard deviation, since the critic does not learn unscaled targets of 15 to 50.
 
     Args:
-        limit: limit of the cost of an episode.
-        episode_steps: length of an episode, by which the mean cost of a step is multiplied.
+        limit: maximum mean cost of an episode.
+        episode_steps: number of steps of an episode, by which the mean cost per step is multiplied.
     """
 
     def __init__(
@@ -92,7 +91,9 @@ class PPOLagrangian(PPO):
     ) -> None:
         self.multiplier, self.episode_steps = Multiplier(limit), episode_steps
         self.share = 1.0
-        """Share by which the limit is divided; with a wide limit, the task is learnt first."""
+        """Number in (0, 1] by which the limit is divided; with a relaxed limit, the policy learns
+        the task first.
+        """
         self.spread, self.discounted = RunningMeanStd(), np.zeros(1)
         super().__init__(*args, **kwargs)
 
@@ -119,9 +120,9 @@ class PPOLagrangian(PPO):
         rollout_buffer: RolloutBuffer,
         n_rollout_steps: int,
     ) -> bool:
-        """Collect a rollout as PPO does, then update the multiplier and the cost critic.
+        """Collect a rollout as in PPO, and update the multiplier and the cost critic.
 
-        The advantages in the buffer then include the cost.
+        The advantages in the rollout buffer are replaced by those that include the cost.
         """
         self._costs: list[Floats] = []
         self._beyond: list[Floats] = []
@@ -141,9 +142,9 @@ class PPOLagrangian(PPO):
         return True
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: Any = None) -> None:
-        """Store the costs of a step, and the critic's value beyond a time limit.
+        """Store the costs of a step, and the cost critic's values of truncated episodes.
 
-        Stable-Baselines3 calls it in every step.
+        Stable-Baselines3 calls this method in each step.
         """
         super()._update_info_buffer(infos, dones)
         beyond = np.zeros(len(infos))
@@ -155,7 +156,10 @@ class PPOLagrangian(PPO):
         self._beyond.append(beyond)
 
     def _evaluate_costs(self, costs: Floats, rollout: RolloutBuffer) -> RolloutBuffer:
-        """Return the rollout with costs (T, E) as its rewards, with returns and advantages."""
+        """Return a copy of the rollout in which scaled costs (T, E) replace the rewards.
+
+        Its values, returns and advantages are those of the cost.
+        """
         sums, now = [], np.broadcast_to(self.discounted, costs.shape[1:])
         for cost, begins in zip(costs, rollout.episode_starts, strict=True):
             now = now * self.gamma * (1 - begins) + cost
@@ -177,7 +181,7 @@ class PPOLagrangian(PPO):
             return self.cost_critic(observations)
 
     def _learn(self, rollout: RolloutBuffer) -> float:
-        """Fit the critic to the returns; return its mean loss in the last pass."""
+        """Fit the cost critic to the returns; return its mean loss in the last pass."""
         observations = _flatten(rollout.observations)
         returns = torch.as_tensor(rollout.returns.reshape(-1, 1))
         losses = []

@@ -1,4 +1,4 @@
-"""Default recipe of each task, for `python -m hrc_env train --task ID`."""
+"""Default training recipe of each task, for `python -m hrc_env train --task ID`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from .requests import TrainingRequest
 
 @dataclass(frozen=True, kw_only=True)
 class Run(TrainingRequest):
-    """Complete training arguments, with defaults that suit most tasks."""
+    """Training arguments without missing values, with defaults that suit most tasks."""
 
     algorithm: str = "ppo"
     control: str = "joint"

@@ -1,7 +1,7 @@
 """Recording of an agent's episodes as a data set of Minari (https://minari.farama.org) or a folder.
 
-Finished episodes are stored in a draft folder beside the data set. At the end, they become the data
-set in a single step.
+Finished episodes are stored in a temporary folder beside the data set, which is renamed in a single
+step at the end.
 """
 
 import contextlib
@@ -44,21 +44,22 @@ from .registry import make_agent
 from .requests import RecordingRequest
 
 TOP = ("cost", "is_success")
-"""Infos that are outside of the groups "belief" and "truth" in a Minari data set."""
+"""Infos at the top level of a Minari data set, outside of the groups "belief" and "truth"."""
 ROOT = "MINARI_DATASETS_PATH"
 """Name of Minari's environment variable for the folder of data sets."""
 MOST_BYTES = 4 * 2**30
-"""Maximum size of the images of episodes that are played together, which stay in memory until the
-episodes end [bytes]."""
+"""Maximum total size of the images of simultaneous episodes, which are held in memory until the
+episodes end [bytes].
+"""
 Episode = dict[str, Any]
-"""Arrays of an episode by name; there is one more observation than there are actions."""
+"""Arrays of an episode, by name. An episode has one more observation than actions."""
 
 
 def run(request: RecordingRequest) -> int:
     """Record episodes, print the path of the data set, and return the exit status.
 
     Raises:
-        MissingExtraError: Minari is needed and not installed.
+        MissingExtraError: Minari is needed but not installed.
         ConfigError: the data set exists, its name is not valid, or requested infos or images are
             not available.
     """
@@ -101,7 +102,7 @@ def _count_steps(file: Path) -> int:
 
 
 def _check_free(path: Path) -> Path:
-    """Return the path of a new folder; raise `ConfigError` if it exists already."""
+    """Return the path of a folder to create; raise `ConfigError` if it already exists."""
     if path.exists():
         raise ConfigError(
             f"{path} exists already and is not extended: choose another --folder, or delete it."
@@ -110,7 +111,7 @@ def _check_free(path: Path) -> Path:
 
 
 def format_command(request: RecordingRequest) -> str:
-    """Return the command line of a recording."""
+    """Return the command line that reproduces a recording."""
     words = ["python", "-m", "hrc_env", "record", request.task]
     for field in fields(RecordingRequest):
         value = getattr(request, field.name)
@@ -189,7 +190,7 @@ def _find_minari_path(minari: Any, name: str) -> Path:
 
 
 def _check_same_request(request: RecordingRequest, draft: Path) -> None:
-    """Create the draft folder, or check that it was created with the same arguments."""
+    """Create the temporary folder, or check that it was created with the same arguments."""
     record, text = draft / "asked.json", json.dumps(asdict(request), indent=1, default=str)
     if record.exists() and record.read_text() != text:
         raise ConfigError(
@@ -200,7 +201,7 @@ def _check_same_request(request: RecordingRequest, draft: Path) -> None:
 
 
 def _play(request: RecordingRequest, first: int, n: int) -> list[Episode]:
-    """Play the episodes `first` to `first + n - 1` together and return them."""
+    """Play the episodes `first` to `first + n - 1` in parallel environments and return them."""
     env = HRCVectorEnv(n, **request.keywords())
     try:
         info, seed = env_info(env.shards.first), request.seed + first
@@ -223,10 +224,10 @@ def _play(request: RecordingRequest, first: int, n: int) -> list[Episode]:
 def _choose_parts(
     request: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int
 ) -> MomentParts:
-    """Select the data to record at each moment of `n` episodes that are played together.
+    """Select the data to record at each step of `n` simultaneous episodes.
 
     Raises:
-        ConfigError: an info does not exist, or there are more images than memory holds.
+        ConfigError: an info does not exist, or the images exceed `MOST_BYTES`.
     """
     available = [name for name in info if not name.startswith("_")]
     names = dict.fromkeys((*TOP, *match_keys(request.infos, available)))
@@ -244,13 +245,13 @@ def _choose_parts(
 
 
 class _Clipped:
-    """An agent with actions clipped to the action space, as data sets require."""
+    """Wrapper of an agent that clips actions to the action space, as data sets require."""
 
     def __init__(self, agent: Agent) -> None:
         self.agent = agent
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return the agent's actions, clipped."""
+        """Return the agent's actions (..., A), clipped to [-1, 1]."""
         return np.clip(self.agent.act(observation), -1, 1)
 
 
@@ -272,7 +273,7 @@ def _make_episode(
 
 
 def _write_episode(path: Path, episode: Episode) -> None:
-    """Write an episode into a file; an interrupted write leaves no partial file."""
+    """Write an episode to a file; an interrupted write leaves no partial file."""
     rough = path.with_suffix(".rough.npz")
     np.savez_compressed(rough, **episode)
     os.replace(rough, path)
@@ -281,7 +282,7 @@ def _write_episode(path: Path, episode: Episode) -> None:
 def _write_minari(
     minari: Any, request: RecordingRequest, path: Path, draft: Path, episodes: list[Episode]
 ) -> None:
-    """Create the data set in the draft folder, then move it to its final path."""
+    """Create the data set in the temporary folder, and move it to its final path."""
     env = gymnasium.make(request.task, **request.keywords())
     with (
         contextlib.closing(env),
@@ -306,7 +307,7 @@ def _write_minari(
 
 @contextlib.contextmanager
 def _redirect_minari(folder: Path) -> Iterator[Path]:
-    """Redirect Minari's output to a folder within the context."""
+    """Redirect Minari's output to a folder within the context manager."""
     before = os.environ.get(ROOT)
     os.environ[ROOT] = str(folder)
     try:

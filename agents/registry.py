@@ -1,4 +1,4 @@
-"""Creation of agents by name, from a policy of the package, from a file, or by a function."""
+"""Creation of agents by name, from an included policy, from a file, or by a function."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from .env_info import Agent, EnvInfo
 from .scripted import Yielding
 
 AGENTS = ("random", "scripted", "scripted_slowed")
-"""Names of the agents that need no checkpoint."""
+"""Names of the built-in agents, which need no checkpoint."""
 OTHERS = (
     f"{policies.PREFIX}ID/NAME, the path of a file of python -m hrc_env train or "
     "Stable-Baselines3 (.zip) or of python -m hrc_env export (.safetensors), or MODULE:FUNCTION, "
@@ -25,7 +25,7 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
     """Return an agent by name, from a file, or from a function.
 
     Args:
-        name: "random", "scripted", "scripted_slowed"; a policy of the package,
+        name: "random", "scripted" or "scripted_slowed"; a policy that comes with the package,
             "hrc://HRCReach-v0/NAME"; the path of a policy (.safetensors), or of a checkpoint of
             `train` or of Stable-Baselines3 (.zip); or "module:function", a function that takes an
             `EnvInfo` and returns an agent.
@@ -33,8 +33,8 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
             returns it.
         seed: seed of a random agent.
         trust: whether pickles in a checkpoint may be loaded, which can run arbitrary code. Only
-            checkpoints with a custom policy or network class, or with statistics of
-            `VecNormalize`, need it.
+            checkpoints with a custom policy or network class, or with statistics of `VecNormalize`,
+            need it.
 
     Raises:
         ConfigError: the name is neither an agent nor a file.
@@ -56,9 +56,9 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
 
 
 def check_agent(name: str) -> None:
-    """Raise `ConfigError` if a name is not that of an agent, before an environment is created.
+    """Raise `ConfigError` if an agent's name is invalid; this needs no environment.
 
-    Files are located and functions are imported. `make_agent` checks whether they fit the
+    Files must exist, and functions are imported. `make_agent` checks whether the agent fits the
     environment.
     """
     if not isinstance(name, str):
@@ -81,12 +81,12 @@ def check_agent(name: str) -> None:
 
 
 def is_policy(name: str) -> bool:
-    """Return whether a name is that of a policy without code (hrc://... or .safetensors)."""
+    """Return whether an agent's name denotes an exported policy (hrc://... or .safetensors)."""
     return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
 def find_control(name: str) -> str | None:
-    """Return the `control` with which a policy was trained, or None if its file has none."""
+    """Return the `control` with which a policy was trained, or None if it is unspecified."""
     check_agent(name)
     if is_policy(name):
         return policies.read(policies.find_path(name)).card.control
@@ -100,7 +100,7 @@ def find_control(name: str) -> str | None:
 
 
 def find_function(name: str) -> Callable[..., Any]:
-    """Import and return the function that is named "module:function".
+    """Import and return a function by its name "module:function".
 
     Raises:
         ConfigError: the function does not exist.
@@ -123,7 +123,7 @@ def _is_checkpoint(name: str) -> bool:
 
 
 def _call_function(name: str, env_info: EnvInfo) -> Agent:
-    """Call the named function, and return the agent that it creates."""
+    """Create an agent by the function with the given name."""
     agent = find_function(name)(env_info)
     if not callable(getattr(agent, "act", None)):
         raise ConfigError(

@@ -1,4 +1,4 @@
-"""Soft actor-critic by Stable-Baselines3, with hindsight replay for tasks with separate goals.
+"""Soft actor-critic (SAC) by Stable-Baselines3, with hindsight replay for separate goals.
 
 Haarnoja et al. 2018, arXiv:1801.01290; Andrychowicz et al. 2017, arXiv:1707.01495.
 """
@@ -25,8 +25,8 @@ def make_learner(
 ) -> SAC:
     """Return a new SAC learner for `env`.
 
-    It begins to learn when every environment has finished an episode. If a transition is relabelled
-    with another goal, the other terms of its reward do not change.
+    Learning begins when every environment has finished an episode. If a transition is relabelled
+    with another goal, only the goal term of its reward changes.
 
     Args:
         env: environments of the training.
@@ -53,13 +53,13 @@ def make_learner(
 
 
 def count_first_steps(env: HRCVecEnv) -> int:
-    """Return the number of random steps before learning, an episode of every environment."""
+    """Return the number of random steps before learning: one episode of each environment."""
     return env.num_envs * (env.env.max_episode_steps + 1)
 
 
 class ResumedSAC(SAC):
-    """SAC for resumed runs, in which the policy fills the empty replay buffer."""
+    """SAC for resumed runs, which fills the replay buffer with the policy's actions first."""
 
     def _sample_action(self, learning_starts: int, *args: Any, **kwargs: Any) -> Any:
-        """Return noisy actions of the policy, from the first step on."""
+        """Return actions that are sampled from the policy, also in the first steps."""
         return super()._sample_action(0, *args, **kwargs)

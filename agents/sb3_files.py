@@ -1,10 +1,10 @@
 """Loading of Stable-Baselines3 policies without executing code from their files.
 
-A file of `model.save` is a zip: `policy.pth` holds the weights, and `data` is JSON, in which values
-that JSON cannot represent are pickles beside a plain description. Loading a pickle can run
-arbitrary code of its author. Weights cannot, and their network is rebuilt here: from the plain
-description if its classes are of Stable-Baselines3 or of this package, otherwise from the pickle,
-which needs `trust`.
+A file of `model.save` is a zip archive: `policy.pth` holds the weights, and `data` is JSON, in
+which values that JSON cannot represent are stored as a pickle and a text description. Loading a
+pickle can run arbitrary code of its author; loading weights cannot. The network of the weights is
+rebuilt here: from the text description if its classes belong to Stable-Baselines3 or to this
+package, otherwise from the pickle, which requires `trust`.
 """
 
 import base64
@@ -48,7 +48,7 @@ POLICIES = {
 }  # fmt: skip
 """Policy classes that can be rebuilt without unpickling, by module.
 
-The modules are those of PPO and A2C, of SAC, and of TD3 and DDPG.
+They are the policies of PPO and A2C, of SAC, and of TD3 and DDPG.
 """
 EXTRACTORS = {
     f"{module}.{name}"
@@ -66,19 +66,19 @@ ACTIVATIONS = tuple(
     for name in ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Mish", "Sigmoid")
 )
 NOT_FOR_ACTING = ("optimizer_class", "optimizer_kwargs")
-"""Arguments of a policy that only training needs."""
+"""Names of a policy's arguments that only training needs."""
 CLASS = re.compile(r"<class '([\w.]+)'>")
 BOX = re.compile(r"'([^']+)': Box\(.*?, \(([\d, ]*)\), \w+\)", re.S)
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
-    """Load the policy in a file of Stable-Baselines3, for acting.
+    """Load the policy from a file of Stable-Baselines3 for acting.
 
     Args:
-        path: a file of `model.save`.
+        path: file that `model.save` wrote.
         env_info: information about the environment in which the policy acts.
-        trust: whether pickles may be loaded if a custom policy or network, or statistics of
-            observations, require it; they can run arbitrary code.
+        trust: whether pickles, which can run arbitrary code, may be loaded if a custom policy or
+            network, or observation-normalization statistics, require it.
 
     Raises:
         CheckpointError: the file does not exist, has other spaces, or needs `trust`.
@@ -91,7 +91,7 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
         check_control(path, control, env_info)
     maker = _find_maker(path, data, trust)
     observations, actions = env_spaces
-    with torch.random.fork_rng(devices=[]):  # the first weights are drawn, and replaced
+    with torch.random.fork_rng(devices=[]):  # initial weights are sampled, then replaced
         policy = _build(
             path,
             lambda: maker.make(observations, actions, lambda _: 0.0, **maker.keywords),
@@ -160,12 +160,12 @@ def make_spaces(env_info: EnvInfo, images: Sequence[str] = ()) -> Spaces:
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Statistics with which `VecNormalize` scales observations."""
+    """Statistics with which `VecNormalize` normalizes observations."""
 
     wrapper: VecNormalize
 
     def apply(self, observation: Observation) -> Any:
-        """Return an observation that is scaled as in training."""
+        """Normalize an observation as in training."""
         return self.wrapper.normalize_obs(observation)  # type: ignore[arg-type]
 
 
@@ -176,10 +176,10 @@ class SB3Agent:
     policy: BasePolicy
     """The policy, in evaluation mode on the CPU."""
     statistics: Statistics | None = None
-    """Statistics that scale observations; None if they are used unscaled."""
+    """Statistics for the normalization of observations, or None if they are not normalized."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return deterministic actions (..., A), bit for bit those of `model.predict`.
+        """Return deterministic actions (..., A), bitwise identical to those of `model.predict`.
 
         Parts of an observation that were not used in training are ignored.
         """
@@ -196,13 +196,13 @@ class PolicyFile(NamedTuple):
     """The contents of a file of Stable-Baselines3."""
 
     data: Mapping[str, Any]
-    """Description of the learner, from the JSON in the file."""
+    """Description of the learner, parsed from the JSON in the file."""
     weights: Mapping[str, torch.Tensor]
     """Weights of the policy's network, by name."""
 
 
 def _read(path: Path) -> PolicyFile:
-    """Return the description and the weights of a file without unpickling."""
+    """Read the description and the weights from a file without unpickling."""
     if not path.exists():
         raise CheckpointError(f"No checkpoint at {path}. Train one: python -m hrc_env train")
     try:
@@ -235,7 +235,7 @@ def _read(path: Path) -> PolicyFile:
 
 
 Shapes = dict[str, tuple[int, ...]]
-"""Shapes of the parts of a space by name; "" for a space without parts."""
+"""Shapes of the parts of a space, by name; the name is "" for a space without parts."""
 
 
 def _check_spaces(
@@ -279,7 +279,7 @@ def _list_shapes(space: spaces.Space[Any]) -> Shapes:
 
 
 def _parse_shapes(space: Any) -> Shapes | None:
-    """Return the shapes of a Box or Dict from its plain description; None for other spaces."""
+    """Return the shapes of a Box or Dict from its text description, or None for other spaces."""
     if not isinstance(space, dict) or ":type:" not in space:
         return None
     if ".box.Box'" in str(space[":type:"]):
@@ -291,7 +291,7 @@ def _parse_shapes(space: Any) -> Shapes | None:
 
 
 def _parse_numbers(text: Any) -> NDArray[np.float64]:
-    """Return the numbers in the text of an array; they are empty if there is no text."""
+    """Parse the numbers in the text of an array; without a text, return an empty array."""
     return np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", str(text or "")), float)
 
 
@@ -309,14 +309,14 @@ def _describe_shapes(shapes: Shapes) -> str:
 
 
 class PolicyMaker(NamedTuple):
-    """A function that makes a policy, and its arguments besides the spaces."""
+    """A function that creates a policy, and its arguments other than the spaces."""
 
     make: Callable[..., BasePolicy]
     keywords: dict[str, Any]
 
 
 def _find_maker(path: Path, data: Mapping[str, Any], trust: bool) -> PolicyMaker:
-    """Return the function that makes the policy of a file, with its arguments."""
+    """Return the function that creates the policy of a file, and its arguments."""
     kind, saved = data.get("policy_class"), data.get("policy_kwargs", {})
     if not isinstance(kind, dict) or not isinstance(saved, dict):
         raise CheckpointError(f"{path} does not describe its policy.")
@@ -341,7 +341,7 @@ def _find_maker(path: Path, data: Mapping[str, Any], trust: bool) -> PolicyMaker
 
 
 def _find_policy_class(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | None:
-    """Return a class in `POLICIES` by its module and the text of its constructor, or None."""
+    """Return the class in `POLICIES` that matches a description, or None if there is none."""
     module = str(kind.get("__module__"))
     found = re.match(r"<function (\w+)\.__init__ ", str(kind.get("__init__")))
     if found is None or found[1] not in POLICIES.get(module, ()):
@@ -350,18 +350,18 @@ def _find_policy_class(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | N
 
 
 class PolicyKeywords(NamedTuple):
-    """Arguments of a policy, split by their representation."""
+    """Arguments of a policy, separated into plain values and pickles."""
 
     plain: dict[str, Any]
     """Arguments that can be read without unpickling, by name."""
     strange: dict[str, str]
-    """Descriptions of the other arguments, by name."""
+    """Text descriptions of the arguments that need unpickling, by name."""
 
 
 def _split_keywords(saved: Mapping[str, Any]) -> PolicyKeywords:
-    """Split a policy's arguments into those that are plain and those that need unpickling."""
+    """Separate a policy's arguments into plain values and those that need unpickling."""
     given = {name: value for name, value in saved.items() if name not in NOT_FOR_ACTING}
-    is_whole = PICKLED not in saved  # then all of it is JSON
+    is_whole = PICKLED not in saved  # then all values are JSON
     plain, strange = dict[str, Any](), dict[str, str]()
     for name, value in given.items():
         if name.startswith(":"):
@@ -400,7 +400,7 @@ def _build(
     try:
         policy = make().to("cpu")
         policy.load_state_dict(weights)
-    except Exception as error:  # of a constructor with arguments from a file
+    except Exception as error:  # a constructor with arguments from a file can raise anything
         first = " ".join(str(error).split())[:300]
         raise CheckpointError(
             f"The weights in {path} do not match the policy that it describes ({first})."
@@ -409,14 +409,14 @@ def _build(
     return policy
 
 
-# Observations that were scaled
+# Normalized observations
 
 
 def find_statistics(path: Path) -> Path | None:
-    """Return the file of `VecNormalize` that belongs to a policy's file; None if there is none.
+    """Return the `VecNormalize` file that belongs to a policy's file, or None if there is none.
 
-    Names are those of Stable-Baselines3's `CheckpointCallback` and of its Zoo:
-    vecnormalize.pkl, NAME_vecnormalize.pkl, NAME_vecnormalize_1000_steps.pkl.
+    The file's name is one of those used by Stable-Baselines3's `CheckpointCallback` and RL
+    Baselines3 Zoo: vecnormalize.pkl, NAME_vecnormalize.pkl, NAME_vecnormalize_1000_steps.pkl.
     """
     steps = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", path.stem)
     names = (f"{path.stem}_vecnormalize.pkl", f"{steps}.pkl", "vecnormalize.pkl")

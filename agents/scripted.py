@@ -1,9 +1,9 @@
-"""Scripted reaching, straight to the goal and, with `Yielding`, slower near people.
+"""Scripted reaching in a straight line to the goal, optionally slower near people (`Yielding`).
 
 The tool's speed is min(v_max, gain e, sqrt(2 a e)) for a distance e to the goal, converted to joint
 velocities by damped least squares (`hrc_env.control`). With `Yielding`, the speed is scaled by the
-*estimated* separation from the worker, as in the paper's motivation: the robot slows down near
-people it perceives, and moves slowly while unseen people may be present.
+*estimated* separation from the worker, as motivated in the paper, and the robot moves slowly while
+unseen people may be present.
 """
 
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ from .env_info import EnvInfo, Observation
 
 Array = NDArray[np.float64]
 GAIN_HZ = 4.0
-"""Approach speed per distance to the goal [1/s]."""
+"""Proportional gain of the approach: speed per distance to the goal [1/s]."""
 BRAKE_MPS2 = 2.5
 """Deceleration at which the tool can stop at its goal [m/s^2]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Yielding:
-    """Slowing down near people, linearly in the estimated distance between two limits."""
+    """Parameters of slowing down near people, linearly in the estimated distance."""
 
     stop_m: float = 0.10
     """Distance below which the robot stands still [m]."""
@@ -36,15 +36,15 @@ class Yielding:
     the robot stops."""
 
     def share(self, gap_m: Array) -> Array:
-        """Return the share of full speed in [0, 1] for distances [m]."""
+        """Return the speed factors in [0, 1] for estimated distances [m]."""
         return np.clip((gap_m - self.stop_m) / (self.full_speed_m - self.stop_m), 0.0, 1.0)
 
     def blind_share(self, terms: dict[str, Array], fastest_m_s: Array) -> Array:
-        """Return the factor in [0, 1] on actions, less than 1 if unseen workers may be present.
+        """Return factors (n,) in [0, 1] on actions, which limit the speed if workers may be unseen.
 
         Args:
             terms: terms of observations, by name.
-            fastest_m_s: speed (n,) of the fastest point of the tool and its load [m/s].
+            fastest_m_s: maximum speed (n,) of a point of the tool and its load [m/s].
         """
         unknown = (terms["worker_unknown"] > 0.5).any(axis=-1)
         share = np.minimum(self.unknown_m_s / np.maximum(fastest_m_s, 1e-9), 1.0)
@@ -63,7 +63,7 @@ def fastest_m_s(velocity: Array, turn: Array, reach_m: float) -> Array:
 
 
 def speed_m_s(error_m: Array, most_m_s: float) -> Array:
-    """Return the speed, at most `most_m_s`, of a tool at a distance from its goal [m/s]."""
+    """Return the speed of a tool at a distance from its goal, limited to `most_m_s` [m/s]."""
     return np.minimum(np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m)), most_m_s)
 
 

@@ -1,4 +1,4 @@
-"""Training runs: training, evaluation on fixed seeds, learning curve, film, and resuming."""
+"""Training runs: training or resuming, evaluation on fixed seeds, learning curve and film."""
 
 import json
 import shlex
@@ -45,12 +45,12 @@ with learner():
 
 
 class SettingsPair(NamedTuple):
-    """Settings of a learner, without and with demonstrations."""
+    """Settings of a learner for training without and with demonstrations."""
 
     alone: Any
-    """Settings of training without demonstrations."""
+    """Settings for training without demonstrations."""
     imitating: Any
-    """Settings of training after imitation of demonstrations."""
+    """Settings for training after the imitation of demonstrations."""
 
 
 SETTINGS = {
@@ -58,27 +58,27 @@ SETTINGS = {
     "ppo_lagrangian": SettingsPair(PPOSettings(), IMITATOR),
     "sac": SettingsPair(SACSettings(), SACSettings(hidden=(256, 256))),
 }
-"""Settings of learners by algorithm."""
+"""Settings of the learners, by the name of the algorithm."""
 DEMONSTRATION_SEED = 2_000_000
-"""First seed of demonstrations, far from those of training and of evaluations."""
+"""Seed of the first demonstration; the seeds of training and evaluation are in other ranges."""
 ONLY_OF_A_RUN = (
     "out", "timesteps", "threads", "episodes", "film", "resume", "engine", "workers", "address",
 )  # fmt: skip
-"""Arguments that a resumed run does not take from the run that it continues."""
+"""Names of the arguments that a resumed run does not take from the run that it continues."""
 SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
-"""Denominators of the two rates in a score, which are printed after their names."""
+"""Denominators of the two rates in a score, printed after the names of the rates."""
 FILM_SEEDS = 8
-"""Number of episodes from which the one with the closest encounter is filmed."""
+"""Number of episodes, of which the one with the closest encounter is filmed."""
 STOPPED = 130
-"""Exit status of a run that Ctrl-C stopped."""
+"""Exit status of a run that was stopped by Ctrl-C."""
 
 
 class TrainingResult(NamedTuple):
-    """The result of a training."""
+    """The result of a training run."""
 
     curve: Curve
     times: dict[str, float] | None
-    """Wall-clock time "training_s" and processor time "processor_s" of all threads [s].
+    """Wall-clock time "training_s" and total processor time of all threads "processor_s" [s].
 
     None if the training was stopped.
     """
@@ -99,7 +99,7 @@ def run(arguments: TrainingRequest) -> int:
         CheckpointError: the run cannot be resumed.
         ConfigError: the environment cannot be created.
     """
-    torch.set_num_threads(1)  # two are slower in networks as small as these
+    torch.set_num_threads(1)  # two threads are slower for such small networks
     console = Console()
     folder = arguments.resume or find_unused(arguments.out)
     if arguments.resume is not None:
@@ -147,14 +147,14 @@ def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
 
 
 def describe_weight(curve: Curve, whole: float) -> str:
-    """Return a text with the last weight of the proximity term, and the full one if it differs."""
+    """Format the last weight of the proximity term, and the full weight if it differs."""
     reached = curve[-1].get("proximity", whole) if curve else whole
     of_whole = "" if reached == whole else f" of {whole:g}: the ramp was not finished"
     return f"proximity weight {reached:g}{of_whole}"
 
 
 def find_unused(folder: Path) -> Path:
-    """Return the first of folder, folder-2, folder-3, ... that contains no policy."""
+    """Return the first of `folder`, `folder`-2, `folder`-3, ... that contains no policy."""
     candidate, number = folder, 1
     while (candidate / "policy.zip").exists():
         number += 1
@@ -166,7 +166,7 @@ def restore_arguments(arguments: TrainingRequest, folder: Path) -> TrainingReque
     """Return the arguments of a resumed run, with the environment and the seed of its start.
 
     Raises:
-        CheckpointError: the folder holds no run, or one that has done all requested steps.
+        CheckpointError: the folder holds no run, or its run has completed all requested steps.
     """
     before = read_arguments(folder)
     total = arguments.timesteps or before.timesteps or 0
@@ -189,7 +189,7 @@ def read_arguments(folder: Path) -> TrainingRequest:
     if not record.exists():
         raise CheckpointError(f"{folder} contains no training run: {record} is missing.")
     saved = json.loads(record.read_text())["arguments"]
-    if saved.get("n_workers") is not None:  # earlier runs hold numbers, not words
+    if saved.get("n_workers") is not None:  # earlier versions stored numbers, not words
         saved["n_workers"] = [str(n) for n in np.atleast_1d(saved["n_workers"])]
     saved = {name: value for name, value in saved.items() if value is not None}
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
@@ -201,7 +201,10 @@ def read_arguments(folder: Path) -> TrainingRequest:
 
 
 def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:
-    """Train a policy and return the result; checkpoints remain if the process is killed."""
+    """Train a policy and return the result.
+
+    Checkpoints are kept if the process is killed.
+    """
     kwargs = arguments.keywords()
     pair = SETTINGS[arguments.algorithm]
     settings = pair.imitating if arguments.demonstrations else pair.alone
@@ -270,7 +273,7 @@ def _make_learner(
             warnings.filterwarnings("ignore", ".*mini-batch size")  # of workers' rollouts
             return StartedLearner(ppo.make_learner(env, settings, seed, log, kind), [])
     learner = checkpoints.resume(folder / "policy.zip", env, folder / "tensorboard")
-    env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
+    env.seed(arguments.seed + learner.num_timesteps)  # other episodes than those of the first part
     if isinstance(learner, SAC):
         refill = learner.learning_starts - learner.num_timesteps
         console.print(
@@ -291,7 +294,7 @@ def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> No
 
 
 def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
-    """Film the policy's closest encounter with a worker; return whether rendering is possible."""
+    """Film the policy's closest encounter with a worker; return whether rendering succeeds."""
     from hrc_env.evaluation.film import film_episode, find_nearest_seed
 
     def make(env_info: EnvInfo) -> checkpoints.TrainedAgent:

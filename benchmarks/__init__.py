@@ -1,1 +1,1 @@
-"""Benchmarks of estimators, detectors, speed and motion; each writes a table and results.json."""
+"""Benchmarks of estimators, detector, speed and motion, which write tables and results.json."""

@@ -1,6 +1,7 @@
 """The command `python -m benchmarks`.
 
-It measures the estimators, the detector, the speed and the motion of workers, and draws a gallery.
+It runs the benchmarks of the estimators, the detector, the speed and the motion of workers, and
+renders a gallery.
 """
 
 import sys
@@ -27,16 +28,16 @@ PROGRAM = "python -m benchmarks"
 
 @dataclass(frozen=True)
 class BenchArguments(EngineArguments):
-    """Arguments of every benchmark.
+    """Arguments common to all benchmarks.
 
-    A run that was stopped continues in the same folder. Benchmarks that measure time always run in
-    this process, one part after the other.
+    An interrupted run is continued if it is started again with the same folder. Benchmarks that
+    measure time always run in this process, one part after the other.
     """
 
     out: Path
-    """Folder for report.html, results.json, figures and finished parts."""
+    """Folder for report.html, results.json, figures and cached results of completed parts."""
     quick: bool = False
-    """Compute every number from less data, in minutes instead of hours."""
+    """Compute all numbers from less data, in minutes instead of hours."""
 
     def show(self, experiment: Experiment[Any]) -> int:
         """Run an experiment and print its tables; return the exit status."""
@@ -54,16 +55,18 @@ class TrackingArguments(BenchArguments):
     seeds: int | None = None
     """Number of sequences per rig and condition (default: 70, quick: 8)."""
     real: bool = False
-    """Use recorded films of four calibrated cameras instead, which are downloaded once (51 MB)."""
+    """Use recorded videos of four calibrated cameras instead; they are downloaded once (51 MB)."""
     estimators: tuple[str, ...] = ()
-    """Estimators to run besides particle: names (also of --import, dlt and smoother), or
-    MODULE:FUNCTION, a function of (P, ctrl_dt, config)."""
+    """Estimators to run in addition to particle: names (including dlt, smoother, and those
+    registered by --import), or MODULE:FUNCTION, a function of (P, ctrl_dt, config).
+    """
     sequences: tuple[str, ...] = ()
     """Sequences to run: a rig (lab, site, env), a condition (clean, occluded, hard, ...), or both,
     e.g. lab.hard."""
     baselines: bool = False
-    """Run the other libraries that are installed instead, on the same sequences (5 per rig and
-    condition, quick: 1)."""
+    """Run the other installed libraries instead, on the same sequences (5 per rig and condition,
+    quick: 1).
+    """
 
     def run(self) -> int:
         """Run the benchmark and print its tables; return the exit status."""
@@ -93,7 +96,7 @@ class TrackingArguments(BenchArguments):
         return self.show(override(config, estimators=names, sequences=sequences))
 
     def _change_folder(self, ending: str) -> BenchArguments:
-        """Return the arguments with an ending appended to the folder if it is the default one."""
+        """Return the arguments with a suffix appended to the folder if it is the default one."""
         is_usual = self.out == TrackingArguments.out
         out = Path(f"{self.out}{ending}") if is_usual else self.out
         return BenchArguments(out, engine=self.engine, workers=self.workers, address=self.address)
@@ -101,18 +104,19 @@ class TrackingArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class SpeedArguments(BenchArguments):
-    """Measure steps per second, the time of each part of a step, and resets.
+    """Measure steps per second, the time of each part of a step, and the time of resets.
 
-    Gymnasium's Reacher and all other ids are measured, too. Nothing else should run on the machine.
+    All environments and Gymnasium's Reacher are measured. Nothing else should run on the machine.
     """
 
     stays = "it measures time, which other processes would disturb"
     out: Path = Path("out/bench_speed")
     task: str | None = None
-    """Id of the only environment to measure (default: HRCReach-v0 and the others); or "every" for
-    just the steps per second of each id."""
+    """Id of the only environment to measure (default: HRCReach-v0 in detail, and all others);
+    "every" measures only the steps per second of each id.
+    """
     shield: str | None = None
-    """Shield that may change commands: qp, ssm, pfl, or a registered one (--import)."""
+    """Shield that filters commands: qp, ssm, pfl, or a registered one (--import)."""
     rounds: int | None = None
     """Number of rounds, of which the median is reported (default: 6, quick: 1)."""
 
@@ -127,12 +131,12 @@ class SpeedArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class MotionArguments(BenchArguments):
-    """Play all motions of workers, and compare their statistics with measurements of people."""
+    """Simulate all motions of workers, and compare their statistics with measurements of people."""
 
     stays = "it has no independent parts"
     out: Path = Path("out/bench_motion")
     seeds: int | None = None
-    """Number of times that each worker plays a scene (default: 12, quick: 2)."""
+    """Number of episodes per worker and scene (default: 12, quick: 2)."""
 
     def run(self) -> int:
         """Run the benchmark and print its tables; return the exit status."""
@@ -145,7 +149,7 @@ class MotionArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class PerceptionArguments(BenchArguments):
-    """Measure level `pixels`: speed, accuracy, and the effects of camera faults.
+    """Measure the perception level `pixels`: speed, accuracy, and effects of camera faults.
 
     Accuracy is measured by pose, distance, view angle and lens.
     """
@@ -161,13 +165,13 @@ class PerceptionArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class Gallery:
-    """Draw every worker, a film strip of every motion, and both scenes from all cameras."""
+    """Render all workers, a film strip of each motion, and both scenes from all cameras."""
 
     out: Path = Path("out/gallery")
-    """Folder for the pictures (PNG) and `index.html`."""
+    """Folder for the images (PNG) and `index.html`."""
 
     def run(self) -> int:
-        """Draw the pictures and print their folder; return the exit status."""
+        """Render the images and print their folder; return the exit status."""
         check_writable_folder(self.out)
         from benchmarks.gallery.gallery import GalleryConfig, run
 
@@ -180,7 +184,7 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Benchmarks:
-    """Measure the estimators, the detector, the environment or the workers, or draw a gallery.
+    """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
     The benchmarks are tracking, perception, speed and motion. Each takes --quick (minutes instead
     of hours) and --out DIR, a folder for report.html, results.json and figures. `tracking --help`,

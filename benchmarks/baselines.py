@@ -33,9 +33,9 @@ from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems on which policies depend."""
+"""Names of the subsystems on which trained policies depend."""
 LEVELS = ("truth", "keypoints", "none", "pixels")
-"""Perception levels."""
+"""Perception levels of the evaluations."""
 NOTE = """\
 Means over {n[truth.random.return]} episodes of 10 s ({n[pixels.random.return]} at `pixels`). Cost \
 and contacts are per episode and computed from the truth; the return depends on the robot's \
@@ -50,10 +50,10 @@ COLUMNS = (
 
 
 class Variant(NamedTuple):
-    """A variant of PPO."""
+    """A variant of PPO, with or without the safety term."""
 
     words: str
-    """Description in tables."""
+    """Description of the variant in tables."""
     weight: float
     """Weight of the safety term during training."""
 
@@ -62,7 +62,7 @@ PPO = {
     "ppo": Variant("PPO without the safety term", 0.0),
     "ppo_safety": Variant("PPO with the safety term", 2.0),
 }
-"""Variants of PPO by name."""
+"""Variants of PPO, by name."""
 AGENTS_SHOWN = {
     **{name: f"`{name}`" for name in AGENTS},
     **{name: variant.words for name, variant in PPO.items()},
@@ -72,12 +72,12 @@ AGENTS_SHOWN = {
 
 @dataclass(frozen=True)
 class BaselinesArguments(StudyArguments):
-    """Evaluate the baselines; with --quick, policies are hardly trained."""
+    """Evaluate the baselines; with --quick, policies are trained for a few thousand steps only."""
 
     out: Path = Path("out/baselines")
-    """Folder for results.json, a report, policies and finished parts."""
+    """Folder for results.json, a report, policies and cached results of completed parts."""
     timesteps: int = 500_000
-    """Environment steps of a training (quick: 4096)."""
+    """Number of environment steps of each training run (quick: 4096)."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a number is invalid."""
@@ -88,10 +88,10 @@ class BaselinesArguments(StudyArguments):
 def make_trainings(
     arguments: BaselinesArguments, levels: tuple[str, ...] = LEVELS
 ) -> dict[tuple[str, str], Training]:
-    """Return the training of each level and policy.
+    """Return the training run of each perception level and variant of PPO.
 
-    At `none`, all workers are unknown and the safety term does not depend on the actions, which
-    makes both policies the same.
+    At `none`, all workers are unknown and the safety term does not depend on the actions; both
+    variants therefore share a policy.
     """
     timesteps, trainings = 4096 if arguments.quick else arguments.timesteps, {}
     key = make_key({"timesteps": timesteps}, TRAINED_ON)
@@ -107,7 +107,7 @@ def make_trainings(
 
 
 def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
-    """Return the study of all agents at all levels; policies that do not exist are left out."""
+    """Return the study of all agents and existing policies at all perception levels."""
     levels = dict.fromkeys(level for level, _ in trainings)
     shown = {
         f"{level}.{agent}": (f"`{level}`", words)
@@ -135,14 +135,14 @@ def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies in a folder."""
+    """Return the study with default arguments and the policies in the folder `out`."""
     return make_study(make_trainings(BaselinesArguments(out)))
 
 
 def main() -> int:
-    """Train and evaluate policies, print the report, and return the exit status."""
+    """Train and evaluate the policies, print the report, and return the exit status."""
     arguments = tyro.cli(BaselinesArguments, description=__doc__)
-    torch.set_num_threads(1)  # two are slower in networks as small as these
+    torch.set_num_threads(1)  # two threads are slower for such small networks
     trainings = make_trainings(arguments)
     for training in trainings.values():
         training.run()

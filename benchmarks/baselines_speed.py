@@ -1,14 +1,15 @@
-"""Speed of other environments in steps per second.
+"""Speed of environments of other packages in steps per second.
 
 This script does not import hrc_env, since gymnasium-robotics and robosuite need other versions of
-MuJoCo and NumPy. It runs in a virtual environment of its own:
+MuJoCo and NumPy. It runs in a separate virtual environment:
 
     python3.11 -m venv others
     others/bin/pip install "gymnasium-robotics==1.4.2" "robosuite==1.5.2" "mujoco==3.5.*" "numpy<2"
     others/bin/python benchmarks/baselines_speed.py
 
-Missing environments are reported. Actions are random, resets are included, and infos are read. The
-result is the median of several runs, in which all environments take turns.
+Missing environments are reported. Actions are random, resets are included in the time, and infos
+are read. The result is the median of several runs; within each run, all environments are measured
+in turn.
 """
 
 import statistics
@@ -18,11 +19,11 @@ from typing import Any
 import gymnasium
 
 RUNS, SECONDS = 5, 4.0
-"""Number of runs, and duration of a run [s]."""
+"""Number of runs, and duration of each environment's measurement in a run [s]."""
 
 
 def make_fetch_reach() -> Any:
-    """Create the task of gymnasium-robotics in which a Fetch arm reaches for a point."""
+    """Create the task of gymnasium-robotics in which a Fetch robot reaches for a point."""
     import gymnasium_robotics
 
     gymnasium.register_envs(gymnasium_robotics)
@@ -30,7 +31,7 @@ def make_fetch_reach() -> Any:
 
 
 def make_lift() -> Any:
-    """Create the task of robosuite in which a Panda lifts a cube, without cameras."""
+    """Create the task of robosuite in which a Panda robot lifts a cube, without cameras."""
     import robosuite
     from robosuite.wrappers import GymWrapper
 

@@ -1,11 +1,11 @@
 """Speed of training with workers of RLlib: python -m benchmarks.cluster [--quick] [--out DIR].
 
-One worker, two workers and Stable-Baselines3 without workers take turns on this machine. The
-benchmark measures the duration of a rollout of 64 steps of each worker's 64 environments, and of
-learning from it by PPO. These times of one worker give a model: workers step in parallel, and one
-core learns from the steps of all of them. An update with n workers takes the time of one rollout
-plus n times the time of learning from it. The model is compared with two workers and extrapolated
-to more.
+One worker, two workers, and Stable-Baselines3 without workers are measured in turn on this machine.
+The benchmark measures the duration of a rollout, with 64 steps of the 64 environments of each
+worker, and of PPO's learning from it. The times of one worker are the parameters of a model: all
+workers step in parallel, and one core learns from their data. An update with n workers takes the
+time of one rollout plus n times the time of learning from it. The model is compared with the
+measurement of two workers and extrapolated to more.
 """
 
 import sys
@@ -45,7 +45,7 @@ SHOWN = {
     f"{PREFIX}goals_total": "goals",
     f"{PREFIX}contacts_total": "contacts",
 }
-"""Axis labels in the figure of Ray's metrics, by their names."""
+"""Axis labels in the figure of Ray's metrics, by the name of the metric."""
 Played = Mapping[str, list[float]]
 
 TABLE = Table(
@@ -84,14 +84,14 @@ TABLE = Table(
 
 @dataclass(frozen=True, slots=True)
 class ClusterBench:
-    """The benchmark, and its amount of data."""
+    """Benchmark of the training speed with RLlib's workers."""
 
     name = "cluster"
     depends = ("env", "tracker", "emulator", "motion", "agents")
     n_rounds: int = 12
-    """Number of rounds in which the contenders take turns."""
+    """Number of rounds, in each of which every contender is measured once."""
     n_watched: int = 60
-    """Number of updates with two workers after which the metrics of Ray are read."""
+    """Number of updates with two workers; the metrics of Ray are read after each one."""
 
     @property
     def seeds(self) -> Sequence[int]:
@@ -100,12 +100,12 @@ class ClusterBench:
 
     @property
     def n_parts(self) -> int:
-        """Number of parts: the times, and the metrics of Ray."""
+        """Number of parts of the benchmark: the times, and the metrics of Ray."""
         return 2
 
     @property
     def quick_note(self) -> str:
-        """Warning on a short run, or "" if it is long enough."""
+        """Warning for the table of a short run, or "" if the run is long enough."""
         is_short = self.n_rounds < ClusterBench().n_rounds
         return f"Quick run, {self.n_rounds} rounds: too few for a comparison." if is_short else ""
 
@@ -114,14 +114,14 @@ class ClusterBench:
         return {**asdict(self), "environment": dict(KEYWORDS), "num_envs": NUM_ENVS}
 
     def play(self, cache: PartCache) -> Played:
-        """Measure the times of every round, and the metrics that Ray exports during a run."""
+        """Measure the times of all rounds, and the metrics that Ray exports during a run."""
         times = cache.make_part("times", self._times)
         return times | cache.make_part("watched", self._watched)
 
     def _times(self, tick: PartProgress) -> dict[str, Any]:
         with _workers() as learners, _alone() as alone:
             found: dict[str, list[float]] = {}
-            for k in range(-1, self.n_rounds):  # the first one warms up
+            for k in range(-1, self.n_rounds):  # the first update is a warm-up
                 for n, learner in learners.items():
                     turn = _measure_turn(learner)
                     if k >= 0:
@@ -151,11 +151,11 @@ class ClusterBench:
         return found
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return metrics_of(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (TABLE,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
@@ -171,8 +171,8 @@ class ClusterBench:
 
 @contextmanager
 def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
-    """Yield learners by their numbers of workers; they wait during the turns of the others."""
-    from hrc_env.agents import ppo  # here and below: learner and Ray take seconds to import
+    """Yield a learner for each number of workers; idle learners wait."""
+    from hrc_env.agents import ppo  # here and below: importing learner and Ray takes seconds
     from hrc_env.agents.learner_settings import PPOSettings
     from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
     from hrc_env.engines import cluster
@@ -186,7 +186,7 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
         try:
             for n in numbers:
                 policy = ppo.make_learner(HRCVecEnv(1, **KEYWORDS), PPOSettings(), 0)
-                share = 1 / len(numbers)  # all exist at once, and one of them works
+                share = 1 / len(numbers)  # all learners exist at once, and one of them is active
                 runners = RunnerSettings(KEYWORDS, n, NUM_ENVS, 0, share, pack())
                 made[n] = RLlibPPO(policy, PPOSettings(), runners)
             yield made
@@ -197,9 +197,9 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
 
 @contextmanager
 def _alone() -> Iterator[Callable[[], float]]:
-    """Yield a function that trains Stable-Baselines3 on a rollout and returns steps per second.
+    """Yield a function that trains Stable-Baselines3 for one rollout and returns steps per second.
 
-    There are as many environments as those of a worker, which are stepped by all cores.
+    The number of environments is that of one worker; all cores step them.
     """
     import torch
 
@@ -207,7 +207,7 @@ def _alone() -> Iterator[Callable[[], float]]:
     from hrc_env.agents.learner_settings import PPOSettings
     from hrc_env.sb3 import HRCVecEnv
 
-    torch.set_num_threads(1)  # as `train` does
+    torch.set_num_threads(1)  # as in `train`
     with closing(HRCVecEnv(NUM_ENVS, stagger=True, **KEYWORDS)) as env:
         learner, n_steps = ppo.make_learner(env, PPOSettings(), 0), NUM_ENVS * PPOSettings().n_steps
         learner.learn(n_steps)
@@ -221,12 +221,12 @@ def _alone() -> Iterator[Callable[[], float]]:
 
 
 class _Turn(NamedTuple):
-    """Times and sizes of a rollout of all workers."""
+    """Duration and size of a rollout of all workers."""
 
     sampled_s: float
-    """Time of a rollout alone [s]."""
+    """Duration of a rollout without learning [s]."""
     updated_s: float
-    """Time of another rollout and of learning from it [s]."""
+    """Duration of another rollout, including learning from it [s]."""
     n_steps: int
     """Number of steps of the rollout."""
     n_bytes: int
@@ -234,7 +234,7 @@ class _Turn(NamedTuple):
 
 
 def _measure_turn(learner: Any) -> _Turn:
-    """Time a rollout without learning, and another one with learning."""
+    """Measure the duration of a rollout without learning, and of another one with learning."""
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
@@ -247,7 +247,7 @@ def _measure_turn(learner: Any) -> _Turn:
 
 
 def _exported() -> dict[str, float]:
-    """Return the values of this package's metrics that Ray exports on this machine, by name."""
+    """Return the current values of the metrics of this package that Ray exports, by name."""
     import ray
 
     (node,) = ray.nodes()
@@ -259,7 +259,7 @@ def _exported() -> dict[str, float]:
 
 
 def _draw(played: Played, path: Path) -> Path:
-    """Plot the metrics of Ray over the time of the run."""
+    """Plot the metrics of Ray over the time of the run, and return the path of the figure."""
     figure = make_figure(9, 6)
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axis, (name, words) in zip(panels, SHOWN.items(), strict=True):
@@ -271,7 +271,7 @@ def _draw(played: Played, path: Path) -> Path:
 
 
 def _step_s(n_steps: int = 50) -> float:
-    """Return the time of a step of the environments without a learner, on one thread [s]."""
+    """Measure the time of a step of all environments in one thread, without a learner [s]."""
     from hrc_env.agents.rllib.runner_env import make_envs
 
     with closing(make_envs(NUM_ENVS, KEYWORDS)) as env:
@@ -284,7 +284,7 @@ def _step_s(n_steps: int = 50) -> float:
 
 
 def metrics_of(played: Played) -> dict[str, Metric]:
-    """Compute the metrics of the measured times and of the model."""
+    """Compute all metrics from the measured times and the model."""
     found = {name: over(played[name], "s") for name in ("step_s", "update_s.1", "update_s.2")}
     found["bytes_per_step"] = over(played["bytes_per_step"], "byte")
     times = {name: np.array(values) for name, values in played.items()}
@@ -314,12 +314,12 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 
 
 def _exact(value: float, unit: str) -> Metric:
-    """Return a metric without an interval, for a number of the model."""
+    """Return a metric without a confidence interval, for a value of the model."""
     return Metric(value, value, value, unit, 1)
 
 
 def make_study(quick: bool = False) -> ClusterBench:
-    """Return the benchmark."""
+    """Return the benchmark, with fewer rounds if `quick`."""
     return ClusterBench(2, 6) if quick else ClusterBench()
 
 

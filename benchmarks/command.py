@@ -22,24 +22,24 @@ from hrc_env.experiments.study import Study
 
 @dataclass(frozen=True)
 class Arguments(EngineArguments):
-    """Arguments of every experiment; a run that was stopped continues in the same folder."""
+    """Arguments of all experiments; an interrupted run is continued if it uses the same folder."""
 
     out: Path
-    """Folder for results.json, a report and finished parts."""
+    """Folder for results.json, a report and cached results of completed parts."""
     quick: bool = False
-    """Compute every number from a few episodes."""
+    """Compute all numbers from a few episodes."""
     overwrite: bool = False
-    """Delete results of other settings in the folder."""
+    """Delete results with other settings in the folder."""
 
 
 @dataclass(frozen=True)
 class StudyArguments(Arguments):
-    """Arguments of every study that plays whole episodes."""
+    """Arguments of all studies that simulate whole episodes."""
 
     only: tuple[str, ...] = ()
     """Rows to run, given by prefixes of their names (default: all)."""
     threads: int | None = None
-    """Number of threads that the environments share (default: all cores)."""
+    """Number of threads that step the environments (default: all cores)."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a number is invalid."""
@@ -61,7 +61,7 @@ def main(make: Callable[[], Study], about: str | None) -> int:
 
     Args:
         make: function that creates the study.
-        about: docstring of the module, which `--help` prints.
+        about: docstring of the study's module, which `--help` prints.
     """
 
     def run() -> int:

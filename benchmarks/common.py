@@ -1,4 +1,4 @@
-"""Functions that the benchmarks share, for normalized errors, tables and names of metrics."""
+"""Common functions of the benchmarks for normalized errors, tables and names of metrics."""
 
 from collections.abc import Iterable
 
@@ -13,13 +13,13 @@ TASKS = tuple(dict.fromkeys((
     "HRCReach-v0", "HRCReachGoal-v0", "HRCPickPlace-v0", "HRCPickPlaceGoal-v0", "HRCHandover-v0",
     "HRCDrywall-v0", "HRCDelivery-v0", *BUILT_IN,
 )))  # fmt: skip
-"""Ids of all built-in tasks, in the order of tables."""
+"""Ids of all built-in tasks, in their order in tables."""
 CHI2_95_3D = 7.815
 """Squared Mahalanobis radius of the 95 % region of a normal distribution in three dimensions."""
 
 
 def make_exact(value: float, unit: str, n: int = 1) -> Metric:
-    """Return a metric without an interval."""
+    """Return a metric without a confidence interval."""
     return Metric(float(value), float(value), float(value), unit, n)
 
 
@@ -29,14 +29,14 @@ def compute_normalized_square(offset: Points3, cov: Covariances3) -> Floats:
 
 
 def list_endings(metrics: Iterable[str], start: str) -> list[str]:
-    """Return the names that begin with `start`, without this prefix."""
+    """Return the names that begin with `start`, with this prefix removed."""
     return [name.removeprefix(start) for name in metrics if name.startswith(start)]
 
 
 def format_number(
     metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False
 ) -> str:
-    """Return a metric in the format of tables, with its interval if requested; "" for None."""
+    """Format a metric for a table, with its interval if requested; return "" for None."""
     if metric is None:
         return ""
     ends = (metric.low, metric.high) if interval else (metric.value, metric.value)

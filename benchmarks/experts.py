@@ -2,8 +2,8 @@
 
     python -m benchmarks.experts
 
-Success, time, cost and contacts are measured on the same seeds without workers, and beside
-attentive workers at several perception levels. Episodes at `pixels` are played one after the other.
+Success, time, cost and contacts are measured on the same seeds without workers, and with attentive
+workers at several perception levels. Episodes at `pixels` are simulated one after the other.
 """
 
 import sys
@@ -20,11 +20,11 @@ from hrc_env.tasks import BUILT_IN
 
 
 class Way(NamedTuple):
-    """An agent and a perception level with which a task is played."""
+    """Agent and perception level of an evaluation."""
 
     agent: str
     level: str
-    """Perception level."""
+    """Perception level of the environment."""
 
 
 WAYS = {
@@ -34,13 +34,13 @@ WAYS = {
     "slowed": Way("scripted_slowed", "keypoints"),
     "pixels": Way("scripted", "pixels"),
 }
-"""Ways to play a task, by their names in the table."""
+"""Agents and perception levels of the evaluations of each task, by the name in tables."""
 NEEDS_WORKERS = ("HRCHandover-v0",)
-"""Tasks that cannot be played without a worker."""
+"""Ids of tasks that require a worker."""
 
 
 def _make_row(task: str, way: str) -> Row:
-    """Return the row of one way to play a task."""
+    """Return the row of a task for one of the `WAYS`."""
     (agent, level), is_pixels = WAYS[way], way == "pixels"
     env = {"task": task, **({"n_workers": 0} if way == "alone" else {})}
     return Row(f"{task}, {way}", 5 if is_pixels else 50, agent, PerceptionSetup(level), env,

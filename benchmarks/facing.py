@@ -1,14 +1,15 @@
-"""Accuracy of one camera by the direction in which the worker faces.
+"""Accuracy of a single camera, by the direction in which the worker faces.
 
     python -m benchmarks.facing
 
-The paper concludes that a single camera gives an accurate 3D pose only of people who face it. Here
-workers of all bodies work in view of the four cameras of the laboratory, which see every moment
-from four directions. Errors are grouped by the absolute angle between the heading of the trunk and
-the direction to the camera. These are the errors of detections in each camera's image while all
-four cameras work, and 3D errors with one camera that remains after the first second, which is not
-evaluated. Joints are left out if furniture, robot or load hides them from that camera, or if they
-are outside its image; joints that the body itself hides are included.
+The paper concludes that a single camera gives an accurate 3D pose only of people who face it. In
+this study, workers with all body shapes work in view of the four cameras of the laboratory, which
+record each moment from four directions. Errors are grouped by the absolute angle between the
+heading of the trunk and the direction to the camera. The study measures the errors of detections in
+the image of each camera while all four cameras work, and 3D errors with a single camera that
+remains after the first second, which is not evaluated. Joints that furniture, robot or load hides
+from the camera, or that are outside its image, are excluded; joints that the body itself hides are
+included.
 """
 
 import sys
@@ -52,50 +53,52 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_truth
 
 YAWS = {0: "faces it", 45: "45 degrees", 90: "sideways", 135: "135 degrees", 180: "turns its back"}
-"""Centres of ranges of angles with descriptions; ranges are 45 degrees wide, at the ends half."""
+"""Descriptions of the ranges of angles by their centre [degrees]. The ranges are 45 degrees wide;
+the first and the last are half as wide.
+"""
 ESTIMATORS = {"keypoints": ("particle", "paper"), "pixels": ("particle",)}
 """Estimators that are evaluated with one camera, by perception level."""
 SHARES = Bins(np.geomspace(1e-4, 10, 600))
-"""Bins of image errors, as shares of the stature."""
+"""Bins of image errors, as fractions of the stature."""
 Counts = dict[str, Any]
-"""Counts by name, each with one row per episode."""
+"""Arrays of counts by name, each with one row per episode."""
 
 
 @dataclass(frozen=True, slots=True)
 class Facing:
-    """The experiment, and its amount of data."""
+    """Experiment on the accuracy of one camera by the direction in which the worker faces."""
 
     name = "facing"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[int, int] = (120, 12)
     """Number of episodes at the levels `keypoints` and `pixels`."""
     seconds: float = 10.0
-    """Length of an episode [s], including the first second."""
+    """Duration of an episode [s], including the first second, which is not evaluated."""
     seed: int = 3_000_000
-    """Seed of the first episode."""
+    """Seed of the first episode; it increases by one with each further episode."""
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Seeds, one per episode."""
+        """Seeds of the episodes."""
         return range(self.seed, self.seed + max(self.episodes))
 
     @property
     def n_parts(self) -> int:
-        """Number of levels."""
+        """Number of parts, one per perception level."""
         return len(ESTIMATORS)
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         is_short = max(self.episodes) < max(Facing().episodes)
         return describe_quick_run(max(self.episodes), self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return asdict(self)
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Return the metrics of both levels, each computed or from the cache."""
+        """Return the metrics of both perception levels, computed or from the cache."""
         key = make_key({"seconds": self.seconds, "seed": self.seed}, self.depends)
         metrics: dict[str, Metric] = {}
         parts = [
@@ -107,15 +110,15 @@ class Facing:
         return metrics
 
     def _measure(self, level: str, n: int, tick: PartProgress) -> dict[str, Any]:
-        """Return the metrics of a level as JSON."""
+        """Measure a perception level and return its metrics in the form of JSON."""
         return {name: asdict(m) for name, m in measure_level(level, n, self).items()}
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (TABLE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
@@ -137,11 +140,13 @@ class Frame(NamedTuple):
     yaw: Ints
     """Index (B, C) in `YAWS` of the worker's direction relative to each camera."""
     free: Bools
-    """Mask (B, C, J) of joints in the image that nothing but the body itself hides."""
+    """Mask (B, C, J) of joints in the image that nothing except the body itself hides."""
     off_share: Floats
-    """Error in the image as a share of the stature in it (B, C, J); NaN without a detection."""
+    """Error in the image, as a fraction of the stature in the image (B, C, J); NaN without a
+    detection.
+    """
     sure: Bools
-    """Mask (B, C, J) of joints with high confidence of the detector."""
+    """Mask (B, C, J) of joints that the detector reports with high confidence."""
     estimate: PoseEstimate
     """Estimated pose after the frame."""
 
@@ -149,7 +154,7 @@ class Frame(NamedTuple):
 def iterate_frames(
     level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence[int], ids: Ints
 ) -> Iterator[Frame]:
-    """Yield the frames after the warm-up of episodes `ids`, with the cameras `kept`."""
+    """Yield the frames of the episodes `ids` after the warm-up, with the cameras `kept`."""
     turn, batch = keep_cameras(RIGS["lab"], kept), np.arange(len(ids))
     config = HRCConfig(worker=BODIES, faults=turn.faults)
     scene = build(config.scene, "lab", 1, walks.bodies.names)
@@ -191,9 +196,9 @@ def find_yaw(joints_world: Points3, eyes_world: Points3) -> Ints:
 def count_errors(
     level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence[int]
 ) -> Counts:
-    """Return counts of errors and of joints by "<name>.<yaw>", with one row per episode.
+    """Count errors and joints by "<name>.<yaw>", with one row per episode.
 
-    With all cameras every episode is played; with a single one, every fourth.
+    With all cameras, all episodes are simulated; with a single camera, every fourth one.
     """
     ids, counts = np.arange(len(seeds)), Counts()
     if len(kept) == 1:
@@ -221,7 +226,7 @@ def count_errors(
 
 
 def measure_level(level: str, n_episodes: int, facing: Facing) -> dict[str, Metric]:
-    """Compute the metrics of a level, with intervals over episodes."""
+    """Compute the metrics of a perception level, with confidence intervals over episodes."""
     seeds, metrics = tuple(range(facing.seed, facing.seed + n_episodes)), {}
     walks = make_walks("lab", 1, seeds, round(facing.seconds / DT_S))
     seen = count_errors(level, "particle", ALL, walks, seeds)
@@ -274,7 +279,7 @@ TABLE = Table(
 
 
 def make_study() -> Facing:
-    """Return the experiment of the command."""
+    """Return the experiment with default settings."""
     return Facing()
 
 

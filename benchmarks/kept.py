@@ -1,9 +1,9 @@
-"""Scores of the package's policies.
+"""Scores of the trained policies that come with the package.
 
     python -m benchmarks.kept
 
 The package contains policies that `python -m benchmarks.learners` and `python -m
-benchmarks.limited` trained, at least one for every task. Each is evaluated without a shield and
+benchmarks.limited` trained, at least one for every task. Each one is evaluated without a shield and
 with the shield `qp`, on the same fixed seeds.
 """
 
@@ -18,14 +18,14 @@ from hrc_env.experiments.study import Row, Study
 
 
 def _make_row(address: str, shield: str | None) -> Row:
-    """Return the row of a policy with or without a shield."""
+    """Return the row of a policy, evaluated with or without a shield."""
     card = policies.read(policies.find_path(address)).card
     env = {"task": card.task, "control": card.control, "shield": shield}
     return Row((f"`{address}`", f"`{shield}`" if shield else "none"), 48, address, env=env)
 
 
 def make_study() -> Study:
-    """Return the study of all policies of the package."""
+    """Return the study of all policies that come with the package."""
     return Study(
         name="kept",
         title="Scores of the package's policies",

@@ -1,11 +1,12 @@
-"""Scores of policies that are trained for every task.
+"""Scores of policies that are trained for each task.
 
     python -m benchmarks.learners
 
-For each task, policies of three seeds are trained by the command on its page, `python -m hrc_env
-train --task ID`, and compared with the scripted agent on the same fixed seeds: success, cost and
-contacts, and the time of the training. For policies, the table shows the median of the seeds with
-the lowest and the highest; for contacts, the range covers their exact 95 % intervals.
+For each task, policies are trained with three seeds by the command on the task's page, `python -m
+hrc_env train --task ID`. Their success, cost and contacts are compared with those of the scripted
+agent on the same fixed seeds, and the time of the training is measured. For policies, the table
+shows the median over the training seeds with the minimum and the maximum; for contacts, the range
+covers the exact 95 % intervals of all seeds.
 """
 
 import sys
@@ -34,23 +35,23 @@ from hrc_env.experiments.versions import make_key
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems on which policies and finished parts depend."""
+"""Names of the subsystems on which policies and the results of parts depend."""
 MEASURED = ("success", "cost", "contacts")
-"""Metrics that are summarized over the seeds."""
+"""Metrics that are summarized over the training seeds."""
 Trainings = Mapping[str, list[Training]]
-"""Trainings by task, one per seed."""
+"""Training runs by task, one per seed."""
 
 
 @dataclass(frozen=True)
 class LearnersArguments(StudyArguments):
-    """Train policies for every task; with --quick, one seed with hardly any training."""
+    """Train policies for each task; with --quick, a single seed for a few thousand steps."""
 
     out: Path = Path("out/learners")
-    """Folder for results.json, the report, policies and finished parts."""
+    """Folder for results.json, the report, policies and cached results of completed parts."""
     ids: tuple[str, ...] = TASKS
     """Ids of the tasks."""
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Seeds of the trainings."""
+    """Seeds of the training runs."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for an unknown task."""
@@ -59,7 +60,7 @@ class LearnersArguments(StudyArguments):
 
 
 def make_trainings(arguments: LearnersArguments) -> Trainings:
-    """Return the trainings of every task."""
+    """Return the training runs of all tasks."""
     key = make_key({"quick": arguments.quick}, DEPENDS)
     more: dict[str, Any] = {} if arguments.threads is None else {"threads": arguments.threads}
     if arguments.quick:
@@ -105,7 +106,7 @@ def make_study(trainings: Trainings) -> Study:
 
 
 def summarize(metrics: Metrics, trainings: Trainings) -> dict[str, Metric]:
-    """Summarize the metrics over the seeds of every task, and the times of the trainings."""
+    """Summarize the metrics and the training times over the seeds of each task."""
     summary = {}
     for task, runs in trainings.items():
         seeds = [f"{task}.policy_{k}" for k, run in enumerate(runs) if run.is_finished]
@@ -127,14 +128,14 @@ def summarize(metrics: Metrics, trainings: Trainings) -> dict[str, Metric]:
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies in a folder."""
+    """Return the study with default arguments and the policies in the folder `out`."""
     return make_study(make_trainings(LearnersArguments(out)))
 
 
 def main() -> int:
-    """Train and evaluate policies, print the report, and return the exit status."""
+    """Train and evaluate the policies, print the report, and return the exit status."""
     arguments = tyro.cli(LearnersArguments, description=__doc__)
-    torch.set_num_threads(1)  # two are slower in networks as small as these
+    torch.set_num_threads(1)  # two threads are slower for such small networks
     trainings = make_trainings(arguments)
     for runs in trainings.values():
         for training in runs:

@@ -1,6 +1,6 @@
-"""Training of policies that studies evaluate, by `python -m hrc_env train`.
+"""Training of the policies that studies evaluate, by `python -m hrc_env train`.
 
-Policies are stored in the folder of the study.
+The policies are stored in the folder of the study.
 """
 
 import json
@@ -18,9 +18,9 @@ class Training:
     """A run of `python -m hrc_env train`."""
 
     folder: Path
-    """Folder of this run only, named after its options."""
+    """Folder of this run, with a name that contains the options."""
     options: Mapping[str, Any]
-    """Options of the command, without `--`."""
+    """Options of the command by name, without `--`."""
 
     @property
     def policy(self) -> Path:
@@ -34,11 +34,11 @@ class Training:
 
     @property
     def score(self) -> dict[str, Any]:
-        """Score that `train` wrote at its end."""
+        """Score that `train` wrote at the end of the run."""
         return json.loads((self.folder / "score.json").read_text())
 
     def run(self) -> None:
-        """Train the policy, or continue its training, unless it is finished."""
+        """Train the policy or continue its training; do nothing if the run is finished."""
         if self.is_finished:
             return
         place = {"resume" if self.policy.exists() else "out": self.folder}

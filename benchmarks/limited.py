@@ -1,11 +1,11 @@
-"""Training with a cost limit, compared with a shield at the evaluation.
+"""Comparison of training with a cost limit and evaluation with a shield.
 
     python -m benchmarks.limited
 
 For each seed, PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For
-PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept: the true
-cost of noisy actions in windows of 250,000 steps, or 1,000 episodes. Both policies are evaluated on
-the same fixed seeds, that of PPO also with a shield.
+PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept, based on the
+true cost of the exploring policy in windows of 250,000 steps (1,000 episodes). Both policies are
+evaluated on the same fixed seeds; the policy of PPO is also evaluated with a shield.
 """
 
 import json
@@ -34,20 +34,22 @@ from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
-"""Subsystems on which policies depend."""
+"""Names of the subsystems on which trained policies depend."""
 WINDOW_STEPS, N_WINDOWS = 250_000, 2
-"""Length of a window [steps], and number of windows at the end that are evaluated."""
+"""Length of a window of the learning curve [environment steps], and number of windows at its end
+that are evaluated.
+"""
 REACHED = 1.1
-"""Multiple of the limit below which a cost counts as having reached it."""
+"""Multiple of the cost limit at which the limit counts as reached."""
 
 
 class Variant(NamedTuple):
-    """A kind of row, of which each seed has one."""
+    """A variant of training and evaluation, which has one row per seed."""
 
     words: str
-    """Description in tables."""
+    """Description of the variant in tables."""
     shield: str | None
-    """Shield of the evaluation, or None."""
+    """Name of the shield in the evaluation, or None."""
 
 
 WORDS = {
@@ -55,10 +57,10 @@ WORDS = {
     "fast": Variant("PPO without a safety term, evaluated with `qp`", "qp"),
     "bare": Variant("the same policies, evaluated without a shield", None),
 }
-"""Kinds of rows by name."""
+"""Variants of training and evaluation, by name."""
 TITLE = "Cost limit or shield"
 Trainings = Mapping[tuple[str, int], Training]
-"""Trainings by learner and seed."""
+"""Training runs by learner and seed."""
 
 
 @dataclass(frozen=True)
@@ -70,15 +72,15 @@ class LimitedArguments(StudyArguments):
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds of environments and learner."""
     cost_limit: float = 30.0
-    """Limit of the cost of an episode."""
+    """Maximum mean cost of an episode."""
     timesteps: int = 3_000_000
-    """Environment steps of a training with the limit (quick: 8192)."""
+    """Number of environment steps of a training run with the cost limit (quick: 8192)."""
     fast_timesteps: int = 1_000_000
-    """Environment steps of a training without a cost limit (quick: 8192)."""
+    """Number of environment steps of a training run without a cost limit (quick: 8192)."""
 
 
 def make_trainings(arguments: LimitedArguments) -> Trainings:
-    """Return the trainings of both learners for every seed."""
+    """Return the training runs of both learners for each seed."""
     limit, trainings = arguments.cost_limit, {}
     for seed in arguments.seeds:
         for name, timesteps, options in (
@@ -119,14 +121,14 @@ def make_study(trainings: Trainings, limit: float) -> Study:
 
 
 def name_row(learner: str, seed: int) -> str:
-    """Return the name of a row in results.json."""
+    """Return the name of the row of a variant and seed in results.json."""
     if learner == "limited":
         return f"limited_{seed}"
     return f"fast_{seed}.{'qp' if learner == 'fast' else 'none'}"
 
 
 def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[str, Metric]:
-    """Compute from the learning curves how closely each learner kept its limit."""
+    """Compute from the learning curves how closely each PPO-Lagrangian run kept its limit."""
     del metrics
     return {
         f"limited_{seed}.{name}": metric
@@ -139,17 +141,17 @@ def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[s
 
 
 def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[str, Metric]:
-    """Compute how closely a training kept its limit.
+    """Compute how closely a training run kept its cost limit.
 
     Args:
-        curve: learning curve of the training.
-        limit: limit of the cost of an episode.
-        n_windows: number of windows at the end that are evaluated.
+        curve: learning curve of the run.
+        limit: maximum mean cost of an episode.
+        n_windows: number of windows at the end of the curve that are evaluated.
 
     Returns:
-        Steps until the smoothed cost was first near the full limit (infinite if never), the mean
-            cost of the last windows, their maximum relative deviation from the limit, and their
-            goals per minute.
+        Number of steps until the smoothed cost was first at most `REACHED` times the full limit
+        (infinite if never), mean cost in the last windows, maximum relative deviation of a window's
+        mean cost from the limit, and goals per minute in the last windows.
     """
     whole = (point for point in curve if point["safety_share"] == 1)
     near = (point["steps"] for point in whole if point["cost"] <= REACHED * limit)
@@ -169,13 +171,13 @@ def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[
 
 
 def make_default(out: Path) -> Study:
-    """Return the study of the command, with the policies in a folder."""
+    """Return the study with default arguments and the policies in the folder `out`."""
     arguments = LimitedArguments(out)
     return make_study(make_trainings(arguments), arguments.cost_limit)
 
 
 def main() -> int:
-    """Train and evaluate policies, print the report, and return the exit status."""
+    """Train and evaluate the policies, print the report, and return the exit status."""
     arguments = tyro.cli(LimitedArguments, description=__doc__)
     torch.set_num_threads(1)
     trainings = make_trainings(arguments)

@@ -1,9 +1,10 @@
-"""Summaries of finished parts of studies: `docs/results/parts/STUDY.json`.
+"""Recorded summaries of completed parts of studies: `docs/results/parts/STUDY.json`.
 
-The parts themselves are large and stay in `out/`. For each list of numbers in a part, a summary has
-five numbers that can be compared with those of another run: the count, the count of finite numbers,
-the mean, the root mean square, and a mean with fixed weights, which depends on the order. If two
-lists agree to a relative tolerance, their summaries agree to the same tolerance.
+A part is an independently cached section of a study's results. Parts are large and stay in `out/`.
+For each list of numbers in a part, the summary contains five numbers that can be compared with
+those of another run: the count, the count of finite numbers, the mean, the root mean square, and a
+mean with fixed weights, which depends on the order. If two lists agree to a relative tolerance,
+their summaries agree to the same tolerance.
 """
 
 import json
@@ -18,46 +19,50 @@ import numpy as np
 from docs import tables
 
 TOLERANCE = 1e-6
-"""Maximum difference of a number between two runs of a part, relative for numbers above 1."""
+"""Maximum difference of a summary's numbers between two runs of a part, relative for numbers above
+1.
+"""
 CLOCK = frozenset({"t"})
-"""Keys of times in parts, which differ in every run."""
+"""Keys of measured times in parts, which are ignored since they differ between runs."""
 Summary = dict[str, list[float]]
-"""Five numbers of each list in a part, by its path: keys, with * for each position in a list."""
+"""The five numbers of each list in a part, by the path of the list: its keys, with * for each
+position in a list.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The record of a finished part."""
+    """The record of a completed part of a study."""
 
     key: str
-    """Key of the settings and versions with which the part was computed."""
+    """Cache key, derived from the settings and versions with which the part was computed."""
     seconds: float
     """Computing time of the part [s]."""
     notes: Mapping[str, float]
-    """Numbers besides the label that a replay needs (`PartCache.make_part`)."""
+    """Additional numbers that a replay of the part needs (`PartCache.make_part`)."""
     summary: Summary
-    """Summary of its numbers."""
+    """Summary of the part's numbers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """The record of a study's parts."""
+    """The records of all parts of a study."""
 
     depends: Mapping[str, int] = field(default_factory=dict)
-    """Versions of the subsystems with which the parts were computed."""
+    """Versions of the subsystems with which the parts were computed, by name."""
     parts: Mapping[str, Part] = field(default_factory=dict)
-    """Parts by label."""
+    """Records of the parts, by label."""
     spoiled: Mapping[str, str] = field(default_factory=dict)
-    """Descriptions of the differences of parts in a replay, by label."""
+    """Descriptions of the differences that a replay found, by label of the part."""
 
 
 def get_path(study: str) -> Path:
-    """Return the path of a study's record."""
+    """Return the path of the file with a study's record."""
     return tables.RESULTS / "parts" / f"{study}.json"
 
 
 def read(study: str) -> Record:
-    """Return the record of a study, which is empty if there is none."""
+    """Read the record of a study; without a file, return an empty record."""
     path = get_path(study)
     if not path.exists():
         return Record()
@@ -67,14 +72,14 @@ def read(study: str) -> Record:
 
 
 def write(study: str, depends: Mapping[str, int], folder: Path, began_s: float) -> None:
-    """Write the record of a study from the parts that its latest run computed or reused.
+    """Write the record of a study for the parts that its latest run computed or reused.
 
     Args:
         study: name of the study.
-        depends: versions of the subsystems on which it depends.
-        folder: folder of its parts; if it has none, the record is deleted.
-        began_s: start of the run in the time of `time.time` [s]; parts that were last used before
-            it are left out.
+        depends: versions of the subsystems on which the study depends, by name.
+        folder: folder of the study's parts; if it contains none, the record is deleted.
+        began_s: start of the run as returned by `time.time` [s]; parts that were last used earlier
+            are left out.
     """
     made = [path for path in sorted(folder.glob("*.json")) if path.stat().st_atime >= began_s - 1]
     parts = {}
@@ -89,7 +94,7 @@ def write(study: str, depends: Mapping[str, int], folder: Path, began_s: float) 
 
 
 def save(study: str, record: Record) -> None:
-    """Write a record, with one line per part."""
+    """Write a study's record to its file, with one line per part."""
     lines = [
         f"  {json.dumps(label)}: "
         + json.dumps({name: getattr(part, name) for name in Part.__slots__}, separators=(",", ":"))
@@ -103,7 +108,7 @@ def save(study: str, record: Record) -> None:
 
 
 def summarize(part: Mapping[str, Any]) -> Summary:
-    """Return the summary of a part."""
+    """Compute the summary of a part."""
     lists: dict[str, list[float]] = {}
     for leaf in _list_leaves(part, ""):
         lists.setdefault(leaf.path, []).append(leaf.value)
@@ -114,12 +119,12 @@ class Leaf(NamedTuple):
     """A number in a part."""
 
     path: str
-    """Keys that lead to the number, with * for each position in a list."""
+    """Path of the number in the part: its keys, with * for each position in a list."""
     value: float
 
 
 def _list_leaves(value: Any, path: str) -> Iterator[Leaf]:
-    """Yield every number of a part with its path; a string is replaced by its checksum."""
+    """Yield all numbers of a part with their paths; a string is represented by its checksum."""
     if isinstance(value, Mapping):
         for key, item in value.items():
             if key not in CLOCK:

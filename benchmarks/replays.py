@@ -1,9 +1,9 @@
 """Replays of the parts of each study, with the settings of its command.
 
-A replay plays an unchanged experiment with a cache (`benchmarks.verify.ReplayCache`) that computes
-the parts that were drawn, and returns an empty part for each of the others. This code does not
+A replay runs an unchanged experiment with a special cache (`benchmarks.verify.ReplayCache`), which
+computes the sampled parts again and returns an empty result for all others. This module does not
 depend on the content of parts. Replays that need a trained policy use the one in the study's
-folder, and leave out its parts if there is none.
+folder; if there is none, the parts that need it are skipped.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,54 +19,54 @@ from hrc_env.experiments.runner import Experiment, make_cache
 
 @dataclass(frozen=True, slots=True)
 class ReplayInput:
-    """The input of a replay."""
+    """Input of a replay."""
 
     cache: PartCache
     """Cache from which the experiment requests its parts."""
     out: Path
     """Folder of the study, which may contain trained policies."""
     notes: Mapping[str, Mapping[str, float]]
-    """Notes of the parts that were drawn, by label."""
+    """Recorded notes of the sampled parts, by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """The replay of a study, with labels of special kinds of parts."""
+    """Function that replays a study, and labels of parts that need special treatment."""
 
     walk: Callable[[ReplayInput], None]
-    """Function that requests every part of the study from the cache."""
+    """Function that requests all parts of the study from the cache."""
     timed: tuple[str, ...] = ()
     """Prefixes of labels of parts that contain measured times."""
     trainings: tuple[str, ...] = ()
-    """Labels of parts that are trainings; one that ends with a dot is a prefix of labels."""
+    """Labels of parts that are training runs; a label that ends with a dot is a prefix."""
     learnt: tuple[str, ...] = ()
-    """Substrings of labels of parts that need a file of a training."""
+    """Substrings of the labels of parts that need a file of a training run."""
     row_words: int = 1
-    """Number of words at the beginning of a label that identify its row."""
+    """Number of dot-separated words at the beginning of a label that identify its row."""
 
     def is_training(self, label: str) -> bool:
-        """Return whether a part is a training."""
+        """Return whether a part is a training run."""
         return label in self.trainings or label.startswith(
             tuple(name for name in self.trainings if name.endswith("."))
         )
 
     def is_repeatable(self, label: str) -> bool:
-        """Return whether a part is the same in every run, without training and measured times."""
+        """Return whether a part is reproducible: neither a training run nor measured times."""
         return not (self.is_training(label) or label.startswith(self.timed))
 
     def is_learnt(self, label: str) -> bool:
-        """Return whether a part needs a file of a training."""
+        """Return whether a part needs a file of a training run."""
         return any(word in label for word in self.learnt)
 
 
 def walk(experiment: Experiment[Any], given: ReplayInput) -> None:
-    """Play an experiment with the cache of a replay."""
+    """Run an experiment with the cache of a replay."""
     usual = make_cache(experiment, given.cache.folder, given.cache.progress)
     experiment.play(replace(given.cache, key=usual.key, n_parts=usual.n_parts))
 
 
 def walk_command(command: str, given: ReplayInput) -> None:
-    """Play the experiment of a command with the cache of a replay."""
+    """Run the experiment of a command with the cache of a replay."""
     walk(_make_experiment(command, given), given)
 
 
@@ -124,10 +124,10 @@ REPLAYS: dict[str, Replay] = {
     "price": Replay(partial(_replay_price, "price"), row_words=2),
     "frontier": Replay(partial(_replay_price, "frontier"), row_words=2),
 }
-"""Replays by command; commands without parts have none."""
+"""Replays by the name of the command; commands without parts have none."""
 
 
 def find_row(name: str, label: str) -> str:
-    """Return the row of a part, the first words of its label."""
+    """Return the name of the row of a part, which consists of the first words of its label."""
     n_words = REPLAYS[name].row_words if name in REPLAYS else 1
     return ".".join(label.split(".")[:n_words])

@@ -1,11 +1,11 @@
 """Regenerate every number and picture of the documentation.
 
 This command runs the studies that are older than the subsystems on which they depend
-(`behaviour.toml`), one after the other. It writes their numbers to `docs/results/whole/`, their
-pictures to `docs/pictures/`, both into the pages, and a summary of every part to
-`docs/results/parts/`, with which `benchmarks.verify` compares replays. Finished parts of a study
-stay in `out/results/`, where a run that was stopped continues. It requires a clean commit, except
-for changes in `docs/`.
+(`behaviour.toml`), one after the other. It writes their numbers to `docs/results/whole/` and their
+pictures to `docs/pictures/`, and inserts both into the pages. It also writes a summary of each part
+to `docs/results/parts/`, with which `benchmarks.verify` compares replays. The results of completed
+parts are cached in `out/results/`, and an interrupted run continues from them. The working tree
+must be clean, except for changes in `docs/`.
 
     python -m benchmarks.results --list            # stale studies, with the reason and the time
     python -m benchmarks.results --only site lab
@@ -43,32 +43,33 @@ from hrc_env.experiments.versions import select_versions
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
-"""Folders for the output of studies, and of their quick forms."""
+"""Folders for the output of studies and of their quick runs."""
 WHOLE, PICTURES = tables.RESULTS / "whole", ROOT / "docs" / "pictures"
 """Folders of the published numbers and pictures."""
 MARK = "made_by.json"
-"""Name of the file in a study's folder that records its versions, its time, and the start of its
-latest run."""
+"""Name of the file in a study's folder that records the versions, the computing time, and the start
+of the latest run.
+"""
 STOPPING_S = 3.0
-"""Time after which an interrupted command is killed [s]."""
+"""Time after an interrupt after which a command is killed [s]."""
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Run the stale studies again."""
+    """Run the studies with outdated (stale) results again."""
 
     only: tuple[str, ...] = ()
-    """Studies to run, even if they are fresh (default: all stale ones)."""
+    """Names of studies to run, even if they are up to date (default: all stale ones)."""
     list: bool = False
-    """Only print the stale studies, with reasons and times."""
+    """Only print the stale studies, with the reasons and the required times."""
     hours: float | None = None
-    """Stop after this time; finished parts are kept."""
+    """Stop after this time [h]; results of completed parts are kept."""
     quick: bool = False
-    """Run quick forms in out/results_quick, and check that they have the metrics of every table."""
+    """Run all studies with --quick in out/results_quick, and check that no table lacks metrics."""
     dirty: bool = False
-    """Run despite uncommitted changes, which are recorded in the results."""
+    """Run despite uncommitted changes; the results record that there were some."""
     trainings: bool = False
-    """Include trainings of policies, which take hours and are needed only for a release."""
+    """Include the training of policies, which takes hours and is needed only for a release."""
 
 
 def main(arguments: Arguments) -> int:
@@ -103,7 +104,7 @@ def main(arguments: Arguments) -> int:
 
 
 def make_plan(stale: Mapping[str, str]) -> Table:
-    """Return a table of commands by study: budget, last time, and the reason why it is stale."""
+    """Return a table of stale commands: time budget, last duration, and reason."""
     heads = ("study", "command", "makes", "budget", "took", "is")
     table = Table(*heads, title="python -m benchmarks.results")
     study_of = {name: label for label, study in STUDIES.items() for name in study.commands}
@@ -120,18 +121,18 @@ def make_plan(stale: Mapping[str, str]) -> Table:
 
 
 def format_time(minutes: float) -> str:
-    """Format a time in minutes, or in hours if it is long."""
+    """Format a duration in minutes, or in hours if it is long."""
     return f"{minutes:.0f} min" if minutes < 100 else f"{minutes / 60:.1f} h"
 
 
 def read_results(name: str) -> dict[str, Any]:
-    """Return the published results of a command; they are empty if there are none."""
+    """Read the published results of a command; without a file, return an empty dict."""
     path = WHOLE / f"{name}.json"
     return json.loads(path.read_text()) if path.exists() else {}
 
 
 def explain_stale(name: str) -> str:
-    """Describe the changes since a study's numbers were computed; "" if there are none."""
+    """Describe the changes since the results of a command were computed, or return ""."""
     command, made = COMMANDS[name], read_results(name)
     before = made.get("depends")
     if before is None:
@@ -153,7 +154,7 @@ def explain_stale(name: str) -> str:
 
 
 def read_settings(name: str) -> dict[str, Any]:
-    """Return the settings of a command as in results.json; they are empty if it has none."""
+    """Return the settings of a command as in results.json, or an empty dict if it has none."""
     source = COMMANDS[name].made
     if source is None:
         return {}
@@ -163,8 +164,8 @@ def read_settings(name: str) -> dict[str, Any]:
 def list_changes(recorded: Mapping[str, Any], current: Mapping[str, Any]) -> Iterator[str]:
     """Yield the settings that have changed, e.g. "n_seeds 10 -> 9".
 
-    Settings that exist in only one of the two are left out: the default of a new one is the former
-    behaviour, and the value of a renamed one is the same.
+    Settings that exist in only one of the two are ignored: the default of a new setting is the
+    former behaviour, and a renamed setting keeps its value.
     """
     for name in recorded:
         if name not in current or recorded[name] == current[name]:
@@ -176,13 +177,13 @@ def list_changes(recorded: Mapping[str, Any], current: Mapping[str, Any]) -> Ite
 
 
 def _shorten(value: Any) -> str:
-    """Return a value as a text of limited length."""
+    """Format a value as a text of limited length."""
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 24 else f"{text[:20]} ..."
 
 
 def describe_source(name: str) -> dict[str, Any]:
-    """Return the command and the versions that the parts of a study in `out/` must have."""
+    """Return the command and the versions that must apply to the cached parts of a study."""
     command = COMMANDS[name]
     return {
         "command": command.command,
@@ -192,7 +193,7 @@ def describe_source(name: str) -> dict[str, Any]:
 
 
 def run(name: str, until_s: float) -> bool:
-    """Run a command until it ends or the time is up; return whether it is finished.
+    """Run a command until it ends or the time is up; return whether it has ended.
 
     Raises:
         HRCError: the command failed.
@@ -201,7 +202,7 @@ def run(name: str, until_s: float) -> bool:
     mark, source = out / MARK, describe_source(name)
     kept = json.loads(mark.read_text()) if mark.exists() else {}
     if source["spoiled"] and kept.get("spoiled") != source["spoiled"]:
-        shutil.rmtree(out, ignore_errors=True)  # its parts have valid keys, and wrong values
+        shutil.rmtree(out, ignore_errors=True)  # cached parts have valid keys, but wrong values
     if {key: kept.get(key) for key in source} != source or not command.is_resumable:
         kept = {**source, "minutes": 0.0}
     kept["began_s"] = time.time()
@@ -217,10 +218,10 @@ def run(name: str, until_s: float) -> bool:
 
 
 def call(command: Command, out: Path, more: str, until_s: float = float("inf")) -> int | None:
-    """Call a command; return its exit status, or None if it was stopped because the time was up."""
+    """Execute a command; return its exit status, or None if it was stopped for lack of time."""
     words = [sys.executable, *command.command.split()[1:], *more.split()]
     words += ["--out", str(out)] if command.tables else []
-    release_folder(out)  # settings may have changed; parts have their keys
+    release_folder(out)  # settings may have changed; the keys of parts differ then
     process = subprocess.Popen(words, cwd=ROOT, start_new_session=True)
     left_s = until_s - time.monotonic()
     try:
@@ -237,7 +238,7 @@ def call(command: Command, out: Path, more: str, until_s: float = float("inf")) 
 
 
 def publish(name: str) -> None:
-    """Copy the numbers and pictures of a finished command into the documentation."""
+    """Copy the numbers and pictures of a completed command into the documentation."""
     command, out = COMMANDS[name], OUT / name
     content = json.loads((out / "results.json").read_text()) if command.tables else provenance()
     mark = json.loads((out / MARK).read_text())
@@ -245,7 +246,7 @@ def publish(name: str) -> None:
     content.get("config", {}).pop("out", None)  # of this machine
     before = read_results(name)
     if command.is_resumable and before.get("config") == content.get("config"):
-        # Some parts may be of earlier runs.
+        # Some parts may have been computed by earlier runs.
         content["minutes"] = max(content["minutes"], before.get("minutes", 0.0))
     content["machine"].pop("system", None)
     content["date"] = datetime.date.today().isoformat()
@@ -281,7 +282,7 @@ def format_results(content: Mapping[str, Any]) -> str:
 
 
 def try_out(console: Console, name: str) -> int:
-    """Run the quick form of a command; return 0 if it yields all required metrics and pictures."""
+    """Run a command with --quick; return 0 if it yields all required metrics and pictures."""
     command, out, started_s = COMMANDS[name], QUICK_OUT / name, time.monotonic()
     if status := call(command, out, command.quick):
         console.print(f"{name}: ended with status {status}")

@@ -1,9 +1,9 @@
-"""Throughput and safety with the shield.
+"""Throughput and safety of a robot with a shield.
 
     python -m benchmarks.shielded
 
-Goals, contacts and cost are measured for the scripted reaching agent, which ignores people, beside
-people who ignore the robot: without a shield, and with the shield `qp` and several perceptions.
+Goals, contacts and cost are measured for the scripted reaching agent, which ignores people, while
+people ignore the robot. The robot has no shield, or the shield `qp` with several perception setups.
 """
 
 import sys
@@ -18,7 +18,7 @@ from hrc_env.perception.faults.fault import ALL, FaultConfig
 from hrc_env.safety.incidents import KINDS
 
 BLIND = (FaultConfig("lost", (ALL,), None, 3.0, 6.0),)
-"""Fault in which all cameras are lost from 3 to 6 s."""
+"""Fault in which all cameras fail from 3 s to 6 s."""
 
 
 def _make_row(

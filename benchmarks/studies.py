@@ -1,7 +1,7 @@
 """The studies that produce the numbers and pictures of the documentation, and their commands.
 
-The commands of a study are run one after the other, and each stores its results under its own name.
-Properties that need no table are tested in `tests/properties/`.
+The commands of a study are run one after the other, and each command stores its results under its
+name. Properties that need no table are tested in `tests/properties/`.
 """
 
 from collections.abc import Collection, Mapping
@@ -21,19 +21,21 @@ EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m benchmarks "
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSource:
-    """The function that creates the experiment of a command, with the settings of the command."""
+    """Reference to the function that creates the experiment of a command, and its arguments."""
 
     module: str
-    """Name of the module."""
+    """Name of the module that contains the function."""
     name: str = "make_study"
-    """Name of a function that creates the experiment, or "STUDY" for the experiment itself."""
+    """Name of the function that creates the experiment, or "STUDY" for a constant that is the
+    experiment.
+    """
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Arguments of the function."""
+    """Keyword arguments of the function."""
     needs_out: bool = False
     """Whether the function's argument is the command's folder, which contains trained policies."""
 
     def make(self, out: Path) -> Experiment[Any]:
-        """Return the experiment.
+        """Create and return the experiment.
 
         Args:
             out: folder of the command.
@@ -46,36 +48,36 @@ class ExperimentSource:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command, and the parts of the documentation that it produces."""
+    """A command, and the tables and pictures of the documentation that it produces."""
 
     command: str
-    """The command line."""
+    """Command line without the options for its folder and its quick run."""
     minutes: float
-    """Budget of time on two cores [min]."""
+    """Time budget on two cores [min]."""
     depends: tuple[str, ...]
-    """Subsystems on which its numbers depend (`behaviour.toml`)."""
+    """Names of the subsystems on which the command's numbers depend (`behaviour.toml`)."""
     tables: tuple[str, ...] = ()
-    """Names of tables of the documentation that it fills and its experiment declares."""
+    """Names of the tables of the documentation that the command fills."""
     pictures: Mapping[str, str] = field(default_factory=dict)
-    """Names of pictures in `docs/pictures/`, with their files in the command's folder `figures`."""
+    """Files in the command's folder `figures`, by the name of the picture in `docs/pictures/`."""
     quick: str = "--quick"
-    """Option of the quick form, or "" if there is none."""
+    """Option for a quick run, or "" if there is none."""
     is_resumable: bool = True
-    """Whether a stopped run keeps its finished parts."""
+    """Whether an interrupted run keeps the results of completed parts."""
     made: ExperimentSource | None = None
-    """Source of its experiment, or None if it has none."""
+    """Source of the command's experiment, or None if it has none."""
     tables_in: str = ""
-    """Name of the module that declares its `TABLES`, if it has no experiment."""
+    """Name of the module that declares the command's `TABLES`, if it has no experiment."""
     is_release: bool = False
-    """Whether it runs only for a release, because it trains policies for hours."""
+    """Whether the command runs only for a release, since it trains policies for hours."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` if there is no subsystem, or one that does not exist."""
+        """Raise `ConfigError` if `depends` is empty or contains an unknown subsystem."""
         check_subsystems(self.depends)
 
     @property
     def declared_tables(self) -> Mapping[str, Table]:
-        """Declarations of its tables, by name."""
+        """Declarations of the command's tables, by name."""
         declared = import_module(self.tables_in).TABLES if self.tables_in else ()
         if self.made is not None:
             declared = getattr(self.made.make(Path()), "shown_tables", tuple)()
@@ -83,28 +85,28 @@ class Command:
 
 
 KEYPOINTS = ("env", "tracker", "emulator", "motion")
-"""Subsystems that affect episodes at level `keypoints`."""
+"""Names of the subsystems that affect episodes at the perception level `keypoints`."""
 PIXELS = ("env", "tracker", "emulator", "detector", "motion")
-"""Subsystems that affect episodes at level `pixels` and all other levels."""
+"""Names of the subsystems that affect episodes at any perception level, including `pixels`."""
 ALL = (*PIXELS, "shield", "agents")
-"""All subsystems."""
+"""Names of all subsystems."""
 
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Commands that are run one after the other."""
+    """A group of commands that are run one after the other."""
 
     commands: Mapping[str, Command]
-    """Commands by name; their files and folders of results have the same names."""
+    """Commands by name; the names of their result files and folders are the same."""
 
     @property
     def minutes(self) -> float:
-        """Budget of time on two cores [min], without commands that run only for a release."""
+        """Time budget on two cores [min], without commands that run only for a release."""
         return sum(each.minutes for each in self.commands.values() if not each.is_release)
 
 
 def _find_experiment(name: str, **options: Any) -> ExperimentSource:
-    """Return the source of an experiment of the package, with the options of its command."""
+    """Return the source of an experiment in `hrc_env.experiments` with the given options."""
     module = f"hrc_env.experiments.{name}.experiment"
     return ExperimentSource(module, "make_experiment", options)
 
@@ -229,15 +231,15 @@ STUDIES: dict[str, Study] = {
         ),
     }),
 }  # fmt: skip
-"""Studies by name, the shortest first."""
+"""Studies by name, in the order of increasing duration."""
 COMMANDS: dict[str, Command] = {
     name: command for study in STUDIES.values() for name, command in study.commands.items()
 }
-"""Commands of all studies by name."""
+"""Commands of all studies, by name."""
 
 
 def list_commands(names: Collection[str]) -> tuple[str, ...]:
-    """Return the names of all commands for names of studies and of commands, in order.
+    """Expand names of studies and commands to names of commands, in order.
 
     Raises:
         ConfigError: a name is neither a study nor a command.

@@ -1,10 +1,11 @@
-"""Check that recorded numbers can be reproduced.
+"""Check that the recorded results of studies can be reproduced.
 
-This command replays a random share of all recorded parts, with at least one of every row of parts
-(labels that begin with the same words, such as a scene, a task or a perception setup), and compares
-them with `docs/results/parts/`. Of a training, the evaluation of its policy is replayed if the
-policy is on this machine. A part that differs makes its study stale: `python -m benchmarks.results
---list` reports it, and the next `make results` computes all parts of the study again.
+This command replays a random sample of all recorded parts and compares them with
+`docs/results/parts/`. The sample contains at least one part of each row, which is a group of parts
+with labels that begin with the same words, such as a scene, a task or a perception setup. A
+training run is not repeated, but the evaluation of its policy is replayed if the policy is on this
+machine. A part that differs makes its study stale: `python -m benchmarks.results --list` reports
+it, and the next `make results` computes all parts of the study again.
 
     python -m benchmarks.verify                      # 2 % of all parts, with the seed of the day
     python -m benchmarks.verify --only site lab --share 1 --longest 60
@@ -40,9 +41,9 @@ from hrc_env.core.results import write_whole
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 
 CONFIDENCE = 0.95
-"""Probability with which a draw should contain a spoiled part."""
+"""Probability with which a sample should contain a part that is not reproducible."""
 LACKING = (DownloadError, MissingExtraError, RenderingError)
-"""Errors due to missing software or downloads, which do not count as differences of a part."""
+"""Exceptions due to missing software or downloads, which do not count as differences of a part."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +51,17 @@ class Arguments:
     """Replay some recorded parts and compare them with their records."""
 
     share: float = 0.02
-    """Share of all parts to replay; at least one of every row is replayed."""
+    """Fraction of all parts to replay; at least one part of each row is replayed."""
     only: tuple[str, ...] = ()
-    """Studies to check (default: all)."""
+    """Names of studies to check (default: all)."""
     seed: int | None = None
-    """Seed of the draw (default: the date as a number)."""
+    """Seed of the random sample (default: the date as a number)."""
     longest: float = 5.0
-    """Maximum time of a part [min]; longer ones are listed, but not replayed."""
+    """Maximum computing time of a part [min]; longer parts are listed, but not replayed."""
     strict: bool = False
-    """Also fail if a study has no recorded parts, or parts that cannot be replayed here."""
+    """Also fail if a study has no recorded parts, or parts that this machine cannot replay."""
     out: Path = Path("out/verify.json")
-    """File for the outcome."""
+    """File to which the outcome is written."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a number is invalid, or a study does not exist."""
@@ -76,35 +77,37 @@ class Outcome:
     """The outcome of a verification."""
 
     seed: int
-    """Seed of the draw."""
+    """Seed of the random sample."""
     share: float
-    """Requested share of parts."""
+    """Requested fraction of parts."""
     n_parts: int = 0
-    """Number of parts that could be drawn."""
+    """Number of parts from which the sample was taken."""
     drawn: dict[str, list[str]] = field(default_factory=dict)
-    """Labels of the parts that were drawn, by study."""
+    """Labels of the sampled parts, by study."""
     spoiled: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Descriptions of the differences of parts, by study and label."""
+    """Descriptions of the differences that were found, by study and label."""
     skipped: dict[str, str] = field(default_factory=dict)
     """Reasons why no part of a study was replayed, by study."""
     lacking: dict[str, list[str]] = field(default_factory=dict)
-    """Labels of parts that were drawn but cannot be replayed on this machine, by study."""
+    """Labels of sampled parts that cannot be replayed on this machine, by study."""
     too_long: dict[str, list[str]] = field(default_factory=dict)
-    """Labels of parts that take too long and were left out of the draw, by study."""
+    """Labels of parts that were not sampled since they take too long, by study."""
     finds_share: float | None = None
-    """Minimum share of spoiled parts, at any positions, that is detected in 95 % of runs."""
+    """Minimum fraction of irreproducible parts, in any rows, that is detected in 95 % of runs."""
     finds_scattered_share: float | None = None
-    """The same share if the spoiled parts are scattered at random over all rows."""
+    """Minimum fraction that is detected if the irreproducible parts are distributed at random over
+    all rows.
+    """
     seconds: float = 0.0
     """Duration of the run [s]."""
 
 
-class AllReplayed(Exception):  # noqa: N818  ends a replay, is not an error
-    """Exception that ends a replay when all drawn parts of a study have been replayed."""
+class AllReplayed(Exception):  # noqa: N818  it ends a replay and is not an error
+    """Exception that ends a replay when all sampled parts of a study have been replayed."""
 
 
 class Unplayed(dict[str, Any]):
-    """A part that was not drawn, with an empty list under every key."""
+    """Placeholder for a part that was not sampled; each of its keys has an empty list."""
 
     def __missing__(self, key: str) -> list[Any]:
         return []
@@ -112,16 +115,18 @@ class Unplayed(dict[str, Any]):
 
 @dataclass(frozen=True, slots=True)
 class ReplayCache(PartCache):
-    """A cache that computes the drawn parts again and compares them with their records."""
+    """A cache that computes the sampled parts again and compares them with their records."""
 
     drawn: Mapping[str, records.Part]
-    """Records of the drawn parts, by label."""
+    """Records of the sampled parts, by label."""
     left: set[str]
     """Labels of parts that are still to be replayed."""
     spoiled: dict[str, str]
-    """Descriptions of the differences of parts, by label."""
+    """Descriptions of the differences that were found, by label."""
     is_training: Callable[[str], bool]
-    """Function that returns whether a label is of a training, which is read from its file."""
+    """Function that returns whether a label is that of a training run, which is read from the cache
+    instead of being repeated.
+    """
 
     def make_part(
         self,
@@ -130,10 +135,10 @@ class ReplayCache(PartCache):
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Compute and compare a part if it was drawn; otherwise return an empty one.
+        """Compute a part and compare it if it is in the sample; otherwise return an empty part.
 
         Raises:
-            AllReplayed: it was the last part that was drawn.
+            AllReplayed: this was the last part of the sample.
         """
         del notes
         if label not in self.left:
@@ -161,11 +166,11 @@ class ReplayCache(PartCache):
 
 
 class ReplayedPart(NamedTuple):
-    """A part that was computed again."""
+    """A part that was computed again, and its difference from the record."""
 
     part: dict[str, Any]
     difference: str
-    """Description of its difference from the record, or "" if there is none."""
+    """Description of the difference from the record, or "" if there is none."""
 
 
 def _replay_part(
@@ -183,7 +188,7 @@ def _replay_part(
 
 
 def main(arguments: Arguments) -> int:
-    """Draw, replay and compare parts, and print the outcome; return 0 if nothing differs."""
+    """Sample, replay and compare parts, and print the outcome; return 0 if nothing differs."""
     console, began_s = Console(), time.monotonic()
     seed = arguments.seed
     if seed is None:
@@ -230,16 +235,16 @@ def explain_skip(name: str, record: records.Record) -> str:
 
 
 class Candidates(NamedTuple):
-    """The parts of studies that can be drawn, and those that take too long."""
+    """Parts of studies from which the sample is taken, and parts that take too long."""
 
     choices: dict[tuple[str, str], float]
-    """Times of parts that can be drawn, by study and label [s]."""
+    """Computing times of the parts from which the sample is taken, by study and label [s]."""
     too_long: dict[str, list[str]]
     """Labels of parts that take too long, by study."""
 
 
 def list_candidates(able: Mapping[str, records.Record], longest_s: float) -> Candidates:
-    """Split the repeatable parts into those that can be drawn and those that take too long."""
+    """Separate the reproducible parts into candidates and those that take too long."""
     choices, too_long = dict[tuple[str, str], float](), dict[str, list[str]]()
     for name, record in able.items():
         for label, part in record.parts.items():
@@ -252,21 +257,21 @@ def list_candidates(able: Mapping[str, records.Record], longest_s: float) -> Can
 
 
 class Draw(NamedTuple):
-    """The parts that were drawn."""
+    """The random sample of parts."""
 
     drawn: dict[str, list[str]]
-    """Labels by study."""
+    """Labels of the sampled parts, by study."""
     n_anywhere: int
-    """Number of parts that were drawn from all parts with equal probability."""
+    """Number of parts that were sampled from all parts with equal probability."""
 
 
 def draw(choices: Mapping[tuple[str, str], float], share: float, rng: np.random.Generator) -> Draw:
-    """Draw a share of all parts, then one of every row of which none has been drawn.
+    """Sample a fraction of all parts, and one part of each row that is not represented yet.
 
     Args:
-        choices: times of the parts [s], by study and label. The first draw has equal probabilities,
-            while the second prefers parts that are replayed quickly.
-        share: share of all parts.
+        choices: computing times of the parts [s], by study and label. The fraction is sampled with
+            equal probabilities; the additional parts are sampled with a preference for short times.
+        share: fraction of all parts that is sampled.
         rng: random generator.
     """
     n_anywhere = math.ceil(share * len(choices))
@@ -289,7 +294,7 @@ def draw(choices: Mapping[tuple[str, str], float], share: float, rng: np.random.
 def replay(
     name: str, record: records.Record, labels: Sequence[str], outcome: Outcome, console: Console
 ) -> None:
-    """Replay parts of a study, and mark those that differ as spoiled in its record."""
+    """Replay parts of a study, and store the differences in its record."""
     study, out = REPLAYS[name], results.OUT / name
     drawn = {label: record.parts[label] for label in labels}
 
@@ -318,11 +323,11 @@ def replay(
 
 
 def compute_found_share(n_parts: int, n_drawn: int) -> float | None:
-    """Return the minimum share of spoiled parts that a draw detects with a probability of 95 %.
+    """Return the minimum fraction of irreproducible parts that a sample detects in 95 % of cases.
 
-    `n_drawn` of `n_parts` parts are drawn with equal probability and without replacement, which
-    makes the number of spoiled parts among them hypergeometric. The result is None if no share is
-    detected with that probability.
+    `n_drawn` of `n_parts` parts are sampled with equal probability and without replacement; the
+    number of irreproducible parts among them has a hypergeometric distribution. The result is None
+    if no fraction is detected with that probability.
     """
     for n_spoiled in range(1, n_parts + 1):
         if 1 - hypergeom.pmf(0, n_parts, n_spoiled, n_drawn) >= CONFIDENCE:
@@ -331,7 +336,7 @@ def compute_found_share(n_parts: int, n_drawn: int) -> float | None:
 
 
 def describe(outcome: Outcome) -> list[str]:
-    """Return sentences that describe an outcome."""
+    """Describe the outcome of a verification in sentences."""
     lines = []
     for name, labels in outcome.lacking.items():
         lines.append(f"{name}: {', '.join(labels)} not replayed, as this machine lacks something "

@@ -5,6 +5,8 @@ The reference (`docs/reference/`) comes from the code, tables of measurements in
 `docs/results/whole/`.
 """
 
+import os
+import re
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +24,11 @@ PAGES = (
     *sorted(DOCS.glob("bring_your_own/*.md")),
 )
 """Written by hand, with tables that are filled in."""
-REFERENCE: dict[Path, Callable[[], str]] = {
+PATH = re.compile(r"(?<![\w/`])docs/([\w/]+)\.md")
+"""Paths of pages, as docstrings name them."""
+PLACEHOLDER = re.compile(r'"(\w+<\w+>)"')
+"""Keys with a variable part, which a browser would take for a tag."""
+WRITERS: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "environment.md": reference.environment,
     **{DOCS / "reference" / f"{each}.md": partial(reference.task_page, each) for each in BUILT_IN},
     DOCS / "reference" / "config.md": reference.config,
@@ -40,6 +46,20 @@ REFERENCE: dict[Path, Callable[[], str]] = {
         for each in names.groups()
     },
 }
+"""Functions that write the pages of the reference."""
+
+
+def write_reference(page: Path) -> str:
+    """Return a page of the reference, in which paths of other pages are links."""
+
+    def link(found: re.Match[str]) -> str:
+        target = os.path.relpath(DOCS / f"{found[1]}.md", page.parent)
+        return f"[{found[1].rpartition('/')[2].replace('_', ' ')}]({target})"
+
+    return PLACEHOLDER.sub(r"`\1`", PATH.sub(link, WRITERS[page]()))
+
+
+REFERENCE = {page: partial(write_reference, page) for page in WRITERS}
 """Generated whole."""
 
 

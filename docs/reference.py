@@ -234,7 +234,8 @@ env = gymnasium.make(
 {settings}
 
 ## Version history
-- `v0`: first version.
+- `v0`: first version, which may change until 0.1.0 is released ([promise of an
+  id](../versions.md#environment-ids)).
 """
 COSTS = ("cost_proximity", "cost_contact", "cost", "episode_cost")
 """Keys of infos that a page of a task explains."""
@@ -617,7 +618,8 @@ def command_line() -> str:
         "parts](../bring_your_own/index.md). A switch is given alone or with a value: `--film`, "
         "`--no-film`, `--film True`, `--film False`.",
         "## Arguments of an environment",
-        "`play` and `train` take these; the first word after `play` is the task.",
+        "`play`, `train`, `evaluate` and `record` take these. The first word after `play`, "
+        "`evaluate` or `record` is the task.",
         _options(EnvironmentArguments),
     ]
     for name, (module, kind, purpose) in __main__.COMMANDS.items():

@@ -89,4 +89,6 @@ if __name__ == "__main__":
     args, options = parser.parse_known_args()
     hrc_env.import_files(args.file)
     compare_accuracy(args.estimators, args.file, ["--episodes", args.episodes, *options])
-    compare_safety(args.estimators, args.safety_episodes, args.out)
+    # each comparison has a folder, in which it continues if it was stopped
+    folder = args.out / "-".join([*args.estimators, str(args.safety_episodes)])
+    compare_safety(args.estimators, args.safety_episodes, folder)

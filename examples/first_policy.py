@@ -28,6 +28,8 @@ class Arguments:
     """Environments that step together."""
     episodes: int = 64
     """Episodes of each evaluation."""
+    ramp: int = 400_000
+    """Environment steps in which the penalty on closeness grows to its full weight."""
     perception: str = "keypoints"
     """Perception level in training and evaluation."""
     out: Path = Path("runs/first")
@@ -40,11 +42,12 @@ def train(arguments: Arguments) -> Path:
     envs = hrc_env.HRCVecEnv(arguments.num_envs, perception=arguments.perception, stagger=True)
     scaled = VecNormalize(envs, norm_obs=False, gamma=0.98)  # rewards only
     model = PPO("MlpPolicy", scaled, **hrc_env.PPOSettings().keywords(), seed=0, verbose=1)
-    ramp = hrc_env.ProximityRamp(400_000)  # the penalty on closeness grows slowly
-    model.learn(arguments.timesteps, callback=ramp, log_interval=20)
+    ramp = hrc_env.ProximityRamp(arguments.ramp)  # the penalty on closeness grows slowly
+    model.learn(arguments.timesteps, callback=ramp, log_interval=10)
     path = arguments.out / "policy.zip"
     path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
+    print(f"The policy is in {path}.")
     envs.close()
     return path
 

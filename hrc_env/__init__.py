@@ -1,4 +1,4 @@
-"""hrc_env: learning of robots that work beside people and observe them only by cameras.
+"""Reinforcement learning for robots that work beside people and observe them only by cameras.
 
 Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")` imports
 the package and makes an environment. `PUBLIC` lists the names of the public interface and the
@@ -241,23 +241,25 @@ PUBLIC = {
     "HRCError": "hrc_env.core.errors",
     "import_files": "hrc_env.registration",
 }
-"""Modules that define the public names, by name."""
+"""Module that defines each public name, by name."""
 RENAMED = {
     "pinholes": "make_cameras",
     "read_capture": "read_recording",
     "sample_window": "crop_window",
 }
-"""Present public names, by their former names."""
+"""Current public names of renamed objects, by former name."""
 EXTRAS = dict.fromkeys(("HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"), "stable_baselines3")
-"""Packages that some public names need and that an extra installs, by name."""
+"""Optional package that a public name requires and that an extra installs, by name."""
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used (PEP 562), and show a class's fields in `help`.
+    """Import a public name when it is first used (PEP 562).
+
+    For a class, `help` and `__doc__` also show the descriptions of its fields.
 
     Raises:
         AttributeError: the name is unknown, or it is a former name; the error suggests the most
-            similar name or the present one.
+            similar name or the current one.
     """
     if name in PUBLIC:
         value = globals()[name] = getattr(import_module(PUBLIC[name]), name)
@@ -275,10 +277,10 @@ def __getattr__(name: str) -> Any:
 
 
 class FormerNames:
-    """A finder for `sys.meta_path` that makes `from hrc_env import FORMER` show the present name.
+    """Finder in `sys.meta_path` that reports the current name for `from hrc_env import FORMER`.
 
-    If `__getattr__` raises an `AttributeError`, Python does not show it but looks for a submodule
-    of that name.
+    An `AttributeError` of `__getattr__` would not be shown, because Python then searches for a
+    submodule of that name.
     """
 
     @staticmethod
@@ -294,7 +296,7 @@ def _said_of(former: str) -> str:
 
 
 def __dir__() -> list[str]:
-    """List the public names; those that need an extra are listed only if it is installed."""
+    """List the public names, except those that require an extra that is not installed."""
     here = [name for name in PUBLIC if name not in EXTRAS or find_spec(EXTRAS[name])]
     return [*here, "__version__"]
 

@@ -1,4 +1,4 @@
-"""The command line, `python -m hrc_env`: set up, play, train and evaluate.
+"""Command-line interface `python -m hrc_env` for setup, playing, training and evaluation.
 
 The module of a command is imported only when the command is called, which keeps the start fast.
 """
@@ -22,7 +22,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "demo": (
         "hrc_env.cli.play", "Demo",
-        "Film a scripted robot that detects a person in rendered images and slows down nearby.",
+        "Film a scripted robot that detects a person in rendered images and slows down near them.",
     ),
     "check": (
         "hrc_env.cli.check", "Check",
@@ -30,7 +30,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "List the valid names of arguments: tasks, perception levels, robots, agents and others.",
+        "List the valid names for arguments: tasks, perception levels, robots, agents and others.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",
@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "export": (
         "hrc_env.cli.export", "Export",
-        "Write a run's policy as a file that executes no code, and a model card with its scores.",
+        "Export a run's policy and a model card with its scores; loading the file executes no code.",
     ),
     "record": (
         "hrc_env.cli.record", "Record",
@@ -65,13 +65,13 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Convert a motion-capture recording (BVH, ASF/AMC or npz) into a clip that workers play.",
     ),
 }  # fmt: skip
-"""Module, class and first sentence of the class's docstring, by command."""
+"""Module and class of each command, and the first sentence of the class's docstring, by name."""
 MOVED = {
     "bench": "python -m benchmarks",
     "gallery": "python -m benchmarks gallery",
     "calibrate-keypoints": "python -m assets.emulator.calibrate",
 }
-"""Commands in a clone of the repository that replace former commands, by their former names."""
+"""Replacements of former commands, by former name. They require a clone of the repository."""
 
 
 def main(words: Sequence[str] | None = None) -> int:

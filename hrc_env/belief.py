@@ -1,4 +1,4 @@
-"""The belief of a robot in one step: its own state, its task and the estimate of the workers.
+"""The belief of a robot in one step: the robot's state, its task and the estimate of the workers.
 
 It never contains the truth about the workers.
 """
@@ -25,7 +25,7 @@ from hrc_env.geometry.distances import (
 from hrc_env.geometry.robot_model import RobotModel
 
 PERSON_M = 0.5
-"""Radius around a person's hips of the patch of floor that the person occupies [m]."""
+"""Radius of the floor area that a person occupies around the hips [m]."""
 NEAR_FLOOR_M = 1.5
 """Distance from a robot beyond which unseen floor is ignored [m]."""
 _LAST = threading.local()
@@ -34,9 +34,10 @@ _LAST = threading.local()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnseenFloor:
-    """The patches of floor on which a person without a track may be.
+    """Patches of floor on which a person without a track may be.
 
-    They belong to unknown slots without a last sighting, or to people in excess of the slots.
+    Such a person belongs to an unknown slot without a last sighting, or exceeds the number of
+    slots.
     """
 
     floor_world: Points3
@@ -57,36 +58,37 @@ class UnseenFloor:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """All information that is available to a robot in one step."""
+    """Information that is available to a robot in one step."""
 
     robot: RobotState
     """Joints, tool and surface of the robot, as measured by the robot's encoders."""
     estimate: PoseEstimate
     """(B, W, ...) estimate of the workers from the cameras' images."""
     separation: Separation
-    """(B, W) smallest gap between the robot and each *estimated* body."""
+    """(B, W) separation of the robot from each *estimated* body."""
     task: Any
-    """View of the task (`Task.view`)."""
+    """The robot's knowledge about its task, as returned by `Task.view`."""
     action: Floats
     """(B, A) last action of the agent, in [-1, 1], before any shield."""
     hand: HandState | None = None
-    """State of the gripper; None if the robot has none."""
+    """State of the hand; None for a robot without a hand."""
     objects: ObjectState | None = None
-    """Measured state of the task's loose objects; None if there are none."""
+    """Measured state of the task's loose objects; None for a task without loose objects."""
     forecast: tuple[PoseEstimate, ...] = ()
     """Forecasts of the workers' poses, one for each horizon in `HRCConfig.forecast_s`."""
     command: JointVelocities | None = None
-    """(B, N) current command of the joint velocities [rad/s]."""
+    """(B, N) joint velocities that are currently commanded [rad/s]."""
     shield_change: JointVelocities | None = None
     """(B, N) joint velocities that the shield allowed in the last step minus those that the agent
     commanded [rad/s]; 0 without a shield."""
     model: RobotModel | None = None
     """Geometry, limits and masses of the robot, which are constant."""
     allowed_contact: Bools | None = None
-    """(B, W, S) whether each segment of an estimated body may touch the robot's hand; None if no
-    segment may."""
+    """Mask (B, W, S) of the segments of the estimated bodies that may touch the robot's hand; None
+    if no contact is allowed."""
     unseen: UnseenFloor | None = None
-    """Floor on which an undetected person may be; None for the whole floor."""
+    """Patches of floor on which an undetected person may be; None without cameras, in which case
+    the person may be anywhere."""
 
 
 def lend_belief(belief: Belief) -> Belief:
@@ -98,10 +100,10 @@ def lend_belief(belief: Belief) -> Belief:
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
-    """Return the smallest gap (B, W) between a robot and each estimated body, hands included.
+    """Return the separation (B, W) of each robot from each estimated body, including its hands.
 
-    It is infinite for a worker without a track; `PoseEstimate.unknown` marks those that may be
-    near.
+    The distance is infinite for a worker without a track. `PoseEstimate.unknown` marks the slots
+    for which an undetected person may be near.
     """
     bodies = segments(estimate.mean_world)
     nearest = least_separation(
@@ -113,9 +115,9 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
 def find_unseen_floor(
     robot: RobotState, estimate: PoseEstimate, vacancy: Vacancy | None
 ) -> UnseenFloor | None:
-    """Find the floor that was not observed to be empty, and its distance from each robot.
+    """Find the patches of floor that were not seen to be empty, and their distance from each robot.
 
-    Unknown slots without a last sighting are considered, and people in excess of the slots.
+    The function considers unknown slots without a last sighting, and people in excess of the slots.
 
     Args:
         robot: (B, ...) state of the robots.
@@ -123,7 +125,7 @@ def find_unseen_floor(
         vacancy: state of the floor; None without cameras.
 
     Returns:
-        The unseen floor; None without cameras.
+        The patches with their states and distances; None without cameras.
     """
     if vacancy is None:
         return None
@@ -174,7 +176,7 @@ def _find_nearest_floor(
         floor: (N, 3) centres of the patches of floor [m].
         piece_m: distance between the centre of a patch and its corners [m].
         level: (B, N) state of each patch.
-        gaps: (B, `EMPTY`) gaps by state [m], which are lowered in place.
+        gaps: (B, `EMPTY`) smallest gap for each state of a patch [m], updated in place.
     """
     head = np.empty(3)
     for b in range(len(capsules)):
@@ -193,7 +195,7 @@ def _find_nearest_floor(
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
     """Return the standard deviation (B, W, J) of each joint [m].
 
-    It is the square root of the variance averaged over the three axes.
+    It is the square root of the mean variance along the three axes.
     """
     cov = estimate.cov_world
     return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3.0)

@@ -55,14 +55,15 @@ class HRCConfig:
     """Horizons of the forecast of the workers' joints in the observation, each in (0, 1] [s]; none
     by default. (0.2, 0.4) adds 120 entries per worker."""
     uncertainty: tuple[str, ...] = ()
-    """Further entries of the observation that describe the covariance of each joint, in addition to
-    its root mean: "towards_robot", the standard deviation along the line to the robot; "factor",
-    the six entries of its Cholesky factor; or both."""
+    """Additional entries of the observation for the covariance of each joint, besides the standard
+    deviation averaged over the axes: "towards_robot", the standard deviation along the line to the
+    robot; "factor", the six entries of the Cholesky factor; or both."""
     observe_shield: bool = False
-    """Whether the observation contains the shield's change of the last command."""
+    """Whether the observation contains the change of the last command by the shield."""
     worker: str | tuple[str, ...] = "worker_1"
-    """Body of the workers: a name, several names, or "any" for all bodies. From several bodies, one
-    is assigned to each worker in every episode; they differ from each other as far as possible."""
+    """Body of the workers: a name, several names, or "any" for all bodies. If there are several,
+    bodies are assigned to the workers in every episode, as far as possible a different one to
+    each."""
     scene: SceneConfig = field(default_factory=SceneConfig)
     """Settings of the scene, the cameras and the physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
@@ -74,7 +75,7 @@ class HRCConfig:
     faults: tuple[FaultConfig, ...] = ()
     """Faults of the cameras, with the times at which they occur (docs/cameras.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
-    """Appearance of scene and workers, drawn for every episode (`perception="pixels"`)."""
+    """Appearance of scene and workers, sampled for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)
     """Settings of the estimator, an instance of `EstimatorSpec.config`."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
@@ -86,9 +87,9 @@ class HRCConfig:
     task: Any = None
     """Settings of the task (`Task.config_type`); None for its defaults."""
     reward: RewardConfig = field(default_factory=RewardConfig)
-    """Weights of the reward's terms."""
+    """Weights of the reward terms that all tasks share."""
     cost: CostConfig = field(default_factory=CostConfig)
-    """Parts of the safety cost."""
+    """Components of the safety cost, and whether a contact ends the episode."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.ctrl_dt) and self.ctrl_dt > 0):

@@ -26,11 +26,11 @@ MEANINGS = {
     "tool": "a velocity of its tool",
     "twist": "velocity and turn rate of its tool",
 }
-"""Meaning of an action without the entry for a hand, by value of `control`."""
+"""Quantities that an action commands, except its entry for a hand, by value of `control`."""
 CONTROLS = tuple(MEANINGS)
 """Valid values of `control`."""
 SINGULAR_M3 = 0.05
-"""Manipulability below which the damping of `twist` increases from zero."""
+"""Manipulability below which the damping in `resolve_twist` increases from zero [m^3]."""
 
 
 @answer_unknown_fields
@@ -42,7 +42,7 @@ class ControlConfig:
         "tool_speed_mps": "tool_speed_m_s",
         "tool_turn_rad_s": "tool_rotation_rad_s",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     joint_speed_share: float = 0.5
     """Velocity of a joint for an action of 1, as a fraction of its limit (`joint`)."""
@@ -53,7 +53,7 @@ class ControlConfig:
     damping: float = 0.07
     """Damping of the least-squares solution (`tool`, `twist`) [m]."""
     posture_gain_hz: float = 0.8
-    """Gain with which joints return to the rest posture, as far as the motion of the tool allows
+    """Gain of the return of the joints to the rest posture, in the null space of the tool's motion
     (`tool`) [1/s]."""
 
     def __post_init__(self) -> None:
@@ -68,7 +68,7 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
     Args:
         control: "joint" (an entry for each joint), "tool" (three) or "twist" (six).
         chain: kinematics of the robot.
-        grips: whether the robot has a hand, which needs a further entry.
+        grips: whether the robot has a hand, which adds an entry to the action.
 
     Raises:
         ConfigError: `control` is unknown, or is not supported by a robot with slides.
@@ -200,14 +200,14 @@ def resolve_twist(
 
 @kernel(makes_arrays=True)
 def _solve_damped(J: Floats, wanted: Floats, squared_damping: Floats, qd: JointVelocities) -> None:
-    """Correct joint velocities by damped least squares, so that J qd approaches the wanted one.
+    """Correct joint velocities by damped least squares to achieve a desired velocity of the tool.
 
     Sums are computed in a fixed order, unlike those of a linear algebra library, because stiff
     contacts amplify differences in the last bit.
 
     Args:
         J: (B, M, N) Jacobians.
-        wanted: (B, M) wanted velocities of the tool.
+        wanted: (B, M) desired velocities of the tool.
         squared_damping: (B,) squared damping [m^2].
         qd: (B, N) joint velocities [rad/s], which are corrected in place.
     """

@@ -44,9 +44,10 @@ from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import TaskType, require_goal
 
 RENDER_MODES = ("rgb_array", "depth_array")
-"""Render modes of an environment."""
+"""Render modes of a single environment."""
 ENDLESS = 2**62
-"""Number of remaining steps if there is no limit; Gymnasium's `TimeLimit` enforces time limits."""
+"""Number of remaining steps of an environment without a time limit. Gymnasium's wrapper `TimeLimit`
+enforces time limits."""
 
 
 class EnvBase(HasSpec, Stateful):
@@ -55,10 +56,10 @@ class EnvBase(HasSpec, Stateful):
     closed = False
     """Whether the environment has been closed."""
     PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
-    """Valid render modes."""
+    """Render modes that this class supports."""
 
     def _open(self, settings: Settings) -> None:
-        """Store the settings, and check those of rendering."""
+        """Store the settings, and check the rendering settings."""
         asked = settings.asked
         check_render_mode(asked.render_mode, self.PICTURES)
         share()
@@ -77,7 +78,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns the reward.
+        """Callable (achieved_goal, desired_goal, info) that computes the reward of transitions.
 
         It takes one pair of goals (n,) and the info of its step, or many pairs (B, n) with a list
         of infos or the infos of a vector environment. With the info of a step it returns exactly
@@ -99,7 +100,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns whether the episode ended.
+        """Callable (achieved_goal, desired_goal, info) that determines whether episodes terminate.
 
         It takes the arguments of `compute_reward`. Reaching a goal does not end an episode; a
         contact ends it if `config.cost.contact_terminates` is true.
@@ -119,7 +120,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns False for each transition.
+        """Callable (achieved_goal, desired_goal, info) that returns False for each transition.
 
         Only the time limit truncates an episode.
 
@@ -129,7 +130,7 @@ class EnvBase(HasSpec, Stateful):
         return partial(goal.compute_terminated, require_goal(self._task))
 
     def _reward_factor(self, term: str) -> float:
-        """Return the factor on a term of the reward, which `set_reward` sets."""
+        """Return the factor of a reward term, as set by `set_reward`."""
         raise NotImplementedError
 
     def refuse_closed(self) -> None:
@@ -172,7 +173,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         rehearse(settings)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
-        """Pictures of the scene at any time and of any size."""
+        """Renderer of pictures of the scene, available at any time and in any size."""
         self.observation_space, self.action_space = make_spaces(self.simulation)
         self._begun = False
         self._steps_left = ENDLESS
@@ -232,7 +233,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         )
 
     def words(self, info: Mapping[str, Any]) -> Words:
-        """Return the indices in an info as names of activities, bodies, contacts and cameras.
+        """Convert the indices in an info to names of activities, bodies, contacts and cameras.
 
         Args:
             info: info that `reset` or `step` returned.
@@ -251,7 +252,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """Faults of this episode's cameras with their drawn amounts; no belief contains them."""
+        """Faults of this episode's cameras with their sampled amounts, which no belief contains."""
         return self.simulation.cameras.faults_of(0)
 
     @property
@@ -275,11 +276,12 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
         """Fix parts of all future episodes until the next call, for example for a curriculum.
 
-        The options are part of `get_state`; a restored state continues with the same episodes.
+        The options are part of the state that `get_state` returns; a restored environment therefore
+        continues with the same options.
 
         Args:
             options: options of `reset`, which replace the previous ones; options passed to `reset`
-                take precedence. None fixes nothing.
+                take precedence. None removes all options.
 
         Raises:
             ConfigError: an option is invalid, or is for a single reset only.
@@ -335,8 +337,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
         Args:
             weights: weights of the terms that all tasks share; None keeps them.
-            factors: factors on any terms by name, also on those of the task: {"goal": 2.0}. All
-                other terms have the factor 1. None keeps the factors.
+            factors: factors by which terms are multiplied, by name, including terms of the task:
+                {"goal": 2.0}. All other terms have the factor 1. None keeps the factors.
 
         Raises:
             ConfigError: a term is unknown, or a factor is not a finite number.
@@ -376,7 +378,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.simulation.reward_factors.get(term, 1.0)
 
     def _with_lasting(self, options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-        """Return the options of a reset by name, merged with those that were set before."""
+        """Return the options of a reset by name, merged with those of `set_options`."""
         return {**self._options, **self._next_options, **_named(options)}
 
     def close(self) -> None:
@@ -387,7 +389,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-    """Return the options of a reset by name; raise `ConfigError` for one of vector environments."""
+    """Return the options of a reset by name; reject the options of vector environments."""
     for name in options if isinstance(options, Mapping) else ():
         if name == "elapsed_steps":
             raise ConfigError(
@@ -400,7 +402,7 @@ def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
 
 
 def _steps_left(options: Mapping[str, Any]) -> int:
-    """Return the number of remaining steps in the options of a reset."""
+    """Return the number of remaining steps that the options of a reset specify."""
     return check_integer('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 

@@ -50,20 +50,20 @@ class EnvConfig:
     (docs/bring_your_own/task.md)."""
     perception: str = "pixels"
     """Perception of people: "pixels" (rendered images, processed by MediaPipe Pose), "keypoints"
-    (an emulator of these two), "truth" (the workers' true poses) or "none". The default of
+    (an emulator of both), "truth" (the workers' true poses) or "none". The default of
     `HRCVectorEnv` and `HRCVecEnv`, which cannot render images in batches, is "keypoints"."""
     estimator: "EstimatorChoice" = "particle"
-    """Estimator of poses from keypoints: "particle", "kalman" (the same with one hypothesis),
-    "paper" (Algorithm 1 as printed), "paper_restarts" (Algorithm 1 with restarts), "triangulation"
-    or "ransac"; the name of a registered estimator, an `EstimatorSpec`, or a function that makes an
-    estimator (docs/bring_your_own/estimator.md)."""
+    """Estimator of poses from keypoints: "particle", "kalman" ("particle" with a single
+    hypothesis), "paper" (Algorithm 1 as printed), "paper_restarts" (Algorithm 1 with restarts),
+    "triangulation" or "ransac"; the name of a registered estimator, an `EstimatorSpec`, or a
+    function that makes an estimator (docs/bring_your_own/estimator.md)."""
     cameras: "str | Path | Sequence[Any] | RigDistribution | Mapping[str, Any] | None" = field(
         default=None, metadata=MANY
     )
     """Cameras: indices or names of cameras of the scene; a rig, given by its name ("lab_gopro"), by
     the path of a TOML file, or as a list of positions (x, y, z) [m], `CameraConfig`s or mappings;
-    or a `RigDistribution` (or mapping), from which the rig of every episode is drawn. None for all
-    cameras of the scene."""
+    or a `RigDistribution` (or mapping), from which the rig of every episode is sampled. None for
+    all cameras of the scene."""
     scene: str | None = None
     """Name of the scene: "lab", a workshop, or "site", a construction site; None for the task's
     default."""
@@ -71,8 +71,8 @@ class EnvConfig:
     """Robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base" or that of a
     registered robot), a `Robot` or a mapping of its fields; None for the task's default."""
     n_workers: int | tuple[int, int] | None = field(default=None, metadata=MANY)
-    """Number of workers, at least 0, or its bounds (fewest, most), between which it is drawn for
-    every episode; the observation has slots for the most. None for the task's default."""
+    """Number of workers, at least 0, or a range (min, max) from which it is sampled for every
+    episode; the observation has slots for the maximum. None for the task's default."""
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
     """Behaviour of workers towards the robot: "attentive", "hurried", "unaware", "headlong", a
     `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
@@ -84,14 +84,14 @@ class EnvConfig:
     {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/cameras.md);
     None for the value in `config` (no faults)."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
-    """Appearance of scene and workers, drawn for every episode: "as_built", "varied", "lights",
+    """Appearance of scene and workers, sampled for every episode: "as_built", "varied", "lights",
     "surfaces", "people", an `AppearanceConfig` or a mapping; None for the value in `config` (as
     built). It affects perception="pixels" and `observe_images`; with perception="keypoints", only
     the brightness of the light has an effect."""
     control: str = "joint"
-    """Meaning of an action: "joint" (joint velocities), "tool" (velocity of the tool) or "twist"
-    (linear and angular velocity of the tool). For a robot with a hand, a further entry commands the
-    hand, from -1 (open) to 1 (closed)."""
+    """Control mode, which defines the meaning of an action: "joint" (joint velocities), "tool"
+    (velocity of the tool) or "twist" (linear and angular velocity of the tool). For a robot with a
+    hand, a further entry commands the hand, from -1 (open) to 1 (closed)."""
     shield: "ShieldChoice" = None
     """Shield that may change a command before the robot executes it: "qp", "ssm", "pfl", a
     `ShieldConfig` or a mapping such as {"kind": "qp", "margin_m": 0.1} (docs/reference/shields.md),
@@ -178,9 +178,9 @@ def check_keywords(kind: type, given: Iterable[str], *inner: type) -> None:
     """Raise `ConfigError` for an unknown keyword; the error suggests the most similar valid one.
 
     Args:
-        kind: class that passes on arguments of an environment; its own parameters are also valid.
-        given: names of the keywords that the class passes on.
-        inner: further classes to which the class passes them.
+        kind: class that forwards arguments of an environment; its parameters are also valid.
+        given: names of the keywords that the class forwards.
+        inner: further classes to which the class forwards them.
     """
     parameters = [name for each in (kind, *inner) for name in signature(each.__init__).parameters]
     names = [name for name in parameters if name not in ("self", "kwargs", "arguments")]

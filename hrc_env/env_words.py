@@ -18,8 +18,8 @@ FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
 def read_cameras(words: Sequence[str]) -> Any:
     """Parse the words of `--cameras` into a value of the argument `cameras`.
 
-    It is the name or file of a rig, the mapping of a distribution of rigs, or a list of names,
-    indices and mappings of cameras.
+    The value is the name or path of a rig, the mapping of a distribution of rigs, or a list of
+    names, indices and mappings of cameras.
     """
     if len(words) == 1:
         from hrc_env.scene.rig_distribution import (
@@ -37,7 +37,7 @@ def read_cameras(words: Sequence[str]) -> Any:
 
 
 def read_config(words: Sequence[str]) -> dict[str, Any]:
-    """Parse FIELD=VALUE words and TOML files into a nested mapping; later ones take precedence."""
+    """Parse FIELD=VALUE words and TOML files into a nested mapping; later words take precedence."""
     config: dict[str, Any] = {}
     for word in words:
         if "=" not in word and not word.endswith(".toml"):
@@ -92,7 +92,7 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "observe_images": _read_counts,
     "faults": lambda words: [_read_fault(text) for text in words],
 }
-"""Functions that parse the words of those arguments that need special treatment, by name."""
+"""Parsers of arguments that need special treatment, by name of the argument."""
 AGENTS_OWN = ("control",)
 """Arguments whose default is determined by the agent."""
 ON_THE_COMMAND_LINE = {
@@ -133,7 +133,7 @@ class Option(NamedTuple):
     annotation: Any
     """Type of the option's words, annotated with the help text."""
     default: Any
-    """Default of the option's words."""
+    """Default of the option, before parsing."""
 
 
 def _options() -> list[Option]:

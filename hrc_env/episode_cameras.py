@@ -1,4 +1,4 @@
-"""The cameras of each environment's episode, and random draws of rigs, faults and appearances.
+"""Cameras of each environment in its current episode: sampled rigs, faults and appearances.
 
 Usually all environments share one perception pipeline; an environment with different cameras has a
 separate pipeline (`pipeline.episodic`).
@@ -31,11 +31,11 @@ from hrc_env.scene.rig_distribution import draw_rig
 from hrc_env.settings import Settings
 
 ALL_DRAWN = Fixed()
-"""An episode without fixed parts."""
+"""Fixed parts of an episode in which all parts are sampled."""
 NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
-"""An empty mapping of fixed parts, for episodes that are drawn completely."""
+"""Empty mapping of fixed parts, for episodes in which all parts are sampled."""
 NEUTRAL = {"darkness": 1.0}
-"""Amounts at which a kind of fault has no effect, for kinds for which this is not 0."""
+"""Amount without effect, by kind of fault; it is 0 for all other kinds."""
 
 
 class EpisodeCameras:
@@ -92,34 +92,34 @@ class EpisodeCameras:
             pipeline.assign(b, setup)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Reset the perception of environments `ids`, and record their drawn values."""
+        """Reset the perception of environments `ids`, and record their sampled values."""
         self.pipeline.reset(ids, sensor_rngs, tracker_rngs)
         self._record(ids)
 
     def info(self, ids: Ints) -> Info:
-        """Return the values drawn for the episodes of environments `ids`; empty without cameras."""
+        """Return the sampled values of the episodes of environments `ids`; none without cameras."""
         return {name: values[ids] for name, values in self._drawn.items()}
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
-        """Return the rig of environment b's episode."""
+        """Return the rig of environment `b` in its current episode."""
         own = self._own(b)
         return self.scene.rig if own is None else own.rig
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the pinhole cameras of environment b's episode, with their matrices."""
+        """Return the pinhole cameras of environment `b` in its current episode."""
         rig = self.rig_of(b)
         return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
 
     @property
     def are_drawn(self) -> bool:
-        """Whether a new rig is drawn for every episode."""
+        """Whether a new rig is sampled for every episode."""
         return self._rigs is not None
 
     def projections(self) -> Floats:
-        """Return the cameras' projection matrices (B, C, 3, 4) in every environment's episode.
+        """Return the projection matrices (B, C, 3, 4) of the cameras of each environment.
 
-        They map world coordinates [m] to pixels; those of cameras that are not in the episode's rig
-        are NaN.
+        They map world coordinates [m] to pixels. The matrix of a camera that is not in the rig of
+        the current episode is NaN.
         """
         batch = len(self._drawn[N_CAMERAS])
         P = np.full((batch, len(self.names), 3, 4), np.nan)
@@ -129,7 +129,7 @@ class EpisodeCameras:
         return P
 
     def faults_of(self, b: int) -> tuple[FaultConfig, ...]:
-        """Return the faults of environment b's cameras, with the amounts drawn for its episode."""
+        """Return the camera faults of environment `b`, with the amounts sampled for its episode."""
         schedule = self.pipeline.schedule_of(b)
         return () if schedule is None else schedule.faults
 
@@ -143,7 +143,7 @@ class EpisodeCameras:
         return self.images.draw(moment, [self.look_of(b, sensor_rngs[b]) for b in ids], rigs)
 
     def look_of(self, b: int, sensor_rng: np.random.Generator) -> Look | None:
-        """Return the appearance drawn for environment b's episode; None for the scene as built."""
+        """Return the appearance sampled for environment `b`; None for the scene as built."""
         look, appearance = self.pipeline.look_of(b), self._appearance_of(b)
         if look is not None or appearance == AS_BUILT:
             return look
@@ -170,11 +170,11 @@ class EpisodeCameras:
             self.images.close()
 
     def _own(self, b: int) -> CameraSetup | None:
-        """Return the cameras of environment b's episode; None if it uses the common ones."""
+        """Return the camera setup of environment `b`; None if it uses the common cameras."""
         return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
 
     def _appearance_of(self, b: int) -> AppearanceConfig:
-        """Return the appearance settings of environment b's episode."""
+        """Return the appearance settings of environment `b` in its current episode."""
         own = self._own(b)
         return self.config.appearance if own is None else own.appearance
 
@@ -190,7 +190,7 @@ class EpisodeCameras:
     def _setup_of_episode(
         self, fixed: Fixed, sensor_rng: np.random.Generator
     ) -> CameraSetup | None:
-        """Return the cameras of an environment's next episode; None if it uses the common ones."""
+        """Return the camera setup of an environment's next episode; None for the common cameras."""
         rigs = self._rigs if fixed.rig is None else fixed.rigs
         if not fixed.changes_cameras and rigs is None:
             return None
@@ -205,7 +205,7 @@ class EpisodeCameras:
         )
 
     def _record(self, ids: Ints) -> None:
-        """Record the values drawn for the episodes of environments `ids`."""
+        """Record the values sampled for the episodes of environments `ids`."""
         if not self._drawn:
             return
         for b in ids.tolist():
@@ -222,7 +222,7 @@ class EpisodeCameras:
 def _difference(
     rig: tuple[CameraConfig, ...], usual: tuple[CameraConfig, ...]
 ) -> Mapping[str, float]:
-    """Return a rig's number of cameras, and the largest shift and rotation from the usual rig."""
+    """Return the number of cameras of a rig, and their largest shift and rotation from `usual`."""
     if rig == usual:
         return {N_CAMERAS: len(rig), MOVED: 0.0, TURNED: 0.0}
     named, moved_m, turned_rad = {camera.name: camera for camera in usual}, 0.0, 0.0
@@ -237,7 +237,10 @@ def _difference(
 
 @lru_cache(maxsize=256)
 def _amounts(faults: tuple[FaultConfig, ...], kinds: tuple[str, ...]) -> Mapping[str, float]:
-    """Return the amount of each kind of fault; of several faults of a kind, the largest effect."""
+    """Return the amount of each kind of fault.
+
+    For several faults of one kind, it is the amount with the largest effect.
+    """
     most = {kind: NEUTRAL.get(kind, 0.0) for kind in kinds}
     for fault in faults:
         none = NEUTRAL.get(fault.kind, 0.0)

@@ -1,4 +1,4 @@
-"""Infos of a step or a reset by name, about cost, incidents, tracking, workers and cameras."""
+"""Entries of the info of a step or a reset: cost, incidents, tracking, workers and cameras."""
 
 from collections.abc import Sequence
 
@@ -19,13 +19,13 @@ from hrc_env.tracking import metrics
 
 
 def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: CostConfig) -> Info:
-    """Return the cost with its parts and the separation, by the names that safe-RL libraries read.
+    """Return the cost, its parts and the separation, under the names that safe-RL libraries read.
 
     Args:
         cost: the cost of the step.
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.
-        present: (B, W) whether each worker is in the scene.
-        config: parts of the cost.
+        present: mask (B, W) of the workers that are in the scene.
+        config: settings of the cost.
     """
     parts = split_cost(cost, happened, config)
     total = sum_cost(parts, config)
@@ -44,14 +44,17 @@ def reset_info(
     terms: Sequence[RewardTerm],
     config: CostConfig,
 ) -> Info:
-    """Return the infos of a reset about reward, cost and incidents: zeros, except the separation.
+    """Return the infos of a reset about reward, cost and incidents.
+
+    They are 0, or NaN for quantities that are not always measured, except the separation, which is
+    computed from the initial poses.
 
     Args:
         robot: states of the robots.
         truth: true poses of the workers.
-        present: (B, W) whether each worker is in the scene.
+        present: mask (B, W) of the workers that are in the scene.
         terms: terms of the reward.
-        config: parts of the cost.
+        config: settings of the cost.
     """
     n = len(present)
     capsules = robot.capsules_world, robot.capsule_radius_m
@@ -94,7 +97,7 @@ def tracking_info(
     Args:
         estimate: estimate of the workers' poses.
         truth: true poses of the workers.
-        present: (B, W) whether each worker is in the scene.
+        present: mask (B, W) of the workers that are in the scene.
         identities: previous assignment of tracks to workers, which is updated in place.
     """
     errors = metrics.measure_errors(estimate, truth.joints_world, present, identities)
@@ -121,7 +124,7 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
     Args:
         cameras: names of the C cameras.
         suspected: (B, C) whether each camera contradicts the others.
-        vacancy: state of the floor; None without cameras, for which no infos are returned.
+        vacancy: state of the floor; None without cameras, in which case no infos are returned.
     """
     if vacancy is None:
         return {}
@@ -134,7 +137,7 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
 
 
 def words_of(bodies: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Return the names that correspond to the indices in infos, by kind of index.
+    """Return the names to which the indices in infos refer, by kind of index.
 
     Args:
         bodies: names of the workers' bodies.

@@ -1,4 +1,4 @@
-"""The observation of an environment, composed of terms that are declared once.
+"""The observation of an environment, which is composed of declared terms.
 
 The observation space, the documentation of the environments, `split` and the tests are derived from
 these declarations and are therefore consistent. Terms read the *estimate* of the workers, never the
@@ -30,7 +30,7 @@ from hrc_env.core.typing import Floats, Tensor
 from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
-"""Valid values of `HRCConfig.uncertainty`, further measures of each joint's covariance."""
+"""Valid values of `HRCConfig.uncertainty`: additional measures of each joint's covariance."""
 FLAT = "observation"
 """Key of the flat observation in an observation dictionary with goals or images."""
 IMAGE = "image_"
@@ -54,9 +54,9 @@ class Sizes:
     uncertainty: tuple[str, ...] = ()
     """Selected values of `UNCERTAINTY`."""
     hands: int = 0
-    """Number of hands, fingered or suction: 1 or 0."""
+    """1 for a robot with a hand (fingers or suction cups), otherwise 0."""
     fingers: int = 0
-    """Number of hands with fingers: 1 or 0."""
+    """1 for a robot with a hand that has fingers, otherwise 0."""
     objects: int = 0
     """Number of loose objects of the task."""
     slides: int = 0
@@ -69,22 +69,22 @@ class ObservationTerm:
     """One block of the flat observation, computed as clip(function, -bound, bound) / scale."""
 
     name: str
-    """Name of the term in `split_observation` and on the environment's page."""
+    """Name of the term in `split_observation` and on the environment's documentation page."""
     size: int | Callable[[Sizes], int]
     """Number of entries, or a function that computes it from `Sizes`."""
     unit: str
-    """Unit of the function's result: "m", "rad", ..., or "-"."""
+    """Unit of the function's result: "m", "rad", ..., or "-" if it has none."""
     frame: str
-    """Frame of vectors: "world", "base", ..., or "-"."""
+    """Coordinate frame of the function's result: "world", "base", ..., or "-" if it has none."""
     bound: float
     """Largest magnitude, in `unit`; larger values are clipped."""
     scale: float
     """Magnitude that corresponds to an observed value of 1, in `unit`."""
     doc: str
-    """Sentence for the environment's page."""
+    """Description of the term for the environment's documentation page, in one sentence."""
     function: Callable[[Belief], Floats]
-    """Function of a belief that returns an array (B, ...), which is flattened for each environment.
-    It is not called for a term without entries."""
+    """Callable that computes an array (B, ...) from a belief. The array is flattened for each
+    environment. The callable is not used for a term without entries."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take one argument."""
@@ -92,14 +92,14 @@ class ObservationTerm:
 
 
 def _nearest_direction(belief: Belief) -> Floats:
-    """Return unit vectors (B, W, 3) from the robot to bodies nearby; 0 for distant ones."""
+    """Return unit vectors (B, W, 3) from the robot to nearby bodies; 0 for distant bodies."""
     to_worker = belief.separation.point_b_world - belief.separation.point_a_world
     near = belief.separation.distance_m < FAR_SEPARATION_M
     return np.where(near[..., None], directions(to_worker, 1e-3), 0.0)
 
 
 def directions(vectors: Floats, softening: float) -> Floats:
-    """Return vectors (..., 3) divided by the sum of their length and a softening; 0 remains 0."""
+    """Return vectors (..., 3), each divided by its length plus `softening`; zero stays zero."""
     shortened = np.array(vectors)
     _shorten(shortened.reshape(-1, 3), softening)
     return shortened
@@ -107,7 +107,7 @@ def directions(vectors: Floats, softening: float) -> Floats:
 
 @kernel
 def _shorten(vectors: Floats, softening: float) -> None:
-    """Divide vectors (n, 3) in place by the sum of their length and a softening."""
+    """Divide each of the vectors (n, 3) in place by its length plus `softening`."""
     for k in range(len(vectors)):
         x, y, z = vectors[k, 0], vectors[k, 1], vectors[k, 2]
         divisor = math.sqrt(x * x + y * y + z * z) + softening
@@ -126,17 +126,17 @@ def _slides(belief: Belief, values: Floats) -> Floats:
 
 
 def _hand(belief: Belief) -> HandState:
-    """Return the state of the hand; raise an error if there is none."""
+    """Return the state of the hand, or raise an error if the robot has none."""
     return require(belief.hand, "A hand")
 
 
 def _objects(belief: Belief) -> ObjectState:
-    """Return the state of the loose objects; raise an error if there are none."""
+    """Return the state of the loose objects, or raise an error if there are none."""
     return require(belief.objects, "A loose object")
 
 
 def _joints_forecast(belief: Belief) -> Floats:
-    """Return joint forecasts (B, W, H, J, 3) for H horizons, relative to the tool point now [m]."""
+    """Return joint forecasts (B, W, H, J, 3) for H horizons, relative to the tool point [m]."""
     joints = np.stack([later.mean_world for later in belief.forecast], axis=2)
     return joints - belief.robot.tool_world[:, None, None, None]
 
@@ -244,7 +244,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: _objects(belief).held.astype(float),
     ),
 )
-"""First terms of the observation, about the robot and the objects that it handles."""
+"""Observation terms about the robot and the objects that it handles, which come first."""
 
 SLIDE_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -268,7 +268,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: _slides(belief, belief.robot.qd),
     ),
 )
-"""Second terms of the observation, about the prismatic joints of a robot that has them."""
+"""Observation terms about the prismatic joints of a mobile base, which follow `ROBOT_TERMS`."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -418,7 +418,8 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: covariance_factor_m(belief.estimate),
     ),
 )
-"""Last terms of the observation, about the last action and the estimated workers."""
+"""Observation terms about the last action and the estimated workers, which follow those of the
+task."""
 
 SHIELD_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
@@ -435,7 +436,7 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
         ),
     ),
 )
-"""Terms that are added if `HRCConfig.observe_shield` is true."""
+"""Observation terms that are appended if `HRCConfig.observe_shield` is true."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -445,7 +446,7 @@ class ObservationLayout:
     terms: tuple[int, ...]
     """Indices of the terms that have entries."""
     slices: dict[str, slice]
-    """Range of entries of each term, by its name."""
+    """Slice of the entries of each term, by name of the term."""
     low: Tensor
     """(n,) lower bound of each entry."""
     high: Tensor
@@ -481,7 +482,8 @@ def observe(
 
     Raises:
         ConfigError: the number of entries of a term differs from its `size`.
-        FloatingPointError: a term is NaN, which is due to an error in code and never to a camera.
+        FloatingPointError: a term is NaN, which indicates an error in the code and never a fault of
+            a camera.
     """
     batch = len(belief.action)
     present = [terms[k] for k in layout.terms]

@@ -76,7 +76,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 def register_robot(robot: "Robot") -> None:
     """Register a robot under its name for `robot=` and `--robot`.
 
-    A warning lists visual geoms, which cameras see, that do not match the capsules, from which
+    A warning is issued if the visual geoms, which cameras see, differ from the capsules, with which
     distances are computed.
 
     Raises:
@@ -95,14 +95,18 @@ def register_robot(robot: "Robot") -> None:
 
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
-    """Register a pose detector for `config={"detector": {"keypoints": name}}` at "pixels".
+    """Register a pose detector under a name for the setting `detector.keypoints`.
+
+    An environment with perception="pixels" uses it with the argument
+    `config={"detector": {"keypoints": name}}`.
 
     Args:
         name: name of the detector.
-        make: function without arguments that is called once in each detection thread. It returns a
-            function of a crop (256, 256, 3), RGB of uint8. That function returns an array (15, 3)
-            with x, y [px] from the crop's corner and confidence in [0, 1] of each of `JOINTS`, or
-            NaN, NaN, 0 for an undetected joint; it returns None if no person is detected.
+        make: callable without arguments, which is called once in each detection thread and returns
+            the detector. The detector is a callable that takes a crop (256, 256, 3), RGB of uint8.
+            It returns an array (15, 3) with x, y [px] from the crop's corner and confidence in [0,
+            1] of each of `JOINTS`, or NaN, NaN, 0 for an undetected joint; it returns None if no
+            person is detected.
 
     Raises:
         ConfigError: the name is already in use, or `make` is not such a function.
@@ -189,7 +193,7 @@ def adopt() -> None:
 
 
 def _import_file(path: Path, recorded: bool) -> None:
-    """Import a file unless it has been imported; child processes import it if it is `recorded`."""
+    """Import a file if it is new; child processes import it only if it is `recorded`."""
     from hrc_env.core.registry import FILES, importing, share
 
     name = f"hrc_env_import_{path.stem}"
@@ -215,7 +219,7 @@ def _import_file(path: Path, recorded: bool) -> None:
 
 
 def _add(table: "Registry[EntryT]", name: str, entry: EntryT, is_function: bool = False) -> None:
-    """Add an entry to a registry.
+    """Add an entry to a registry, after a check of its name.
 
     Args:
         table: the registry.
@@ -275,7 +279,7 @@ class Spec(EnvSpec):
 
 
 def make_spec(spec: EnvSpec) -> Spec:
-    """Return a specification with plain arguments, in which names replace registered objects."""
+    """Return a specification with plain arguments, which refers to registered objects by name."""
     from hrc_env.core.mapping import convert_to_plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS

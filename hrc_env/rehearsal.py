@@ -20,16 +20,17 @@ from hrc_env.tasks.task import is_known
 from hrc_env.tracking.estimators import BUILT_IN, ESTIMATORS
 
 _PLAYED: list[tuple[Any, ...]] = []
-"""Combinations of custom parts that have passed a trial run, which is not repeated."""
+"""Combinations of custom task, estimator and shield that have passed a trial run."""
 _KEPT = 32
 """Largest number of combinations in `_PLAYED`."""
 
 
 def rehearse(settings: Settings) -> None:
-    """Play two steps with a custom task, estimator or shield, unless they have been checked before.
+    """Play two steps with a custom task, estimator or shield, unless their combination was checked.
 
     Raises:
-        ConfigError: a function of these parts returns a wrong type, shape or value.
+        ConfigError: a function of the task, the estimator or the shield returns a wrong type, shape
+            or value.
     """
     task = None if is_known(type(settings.task)) else type(settings.task)
     parts = task, _find_own_estimator(settings), _find_own_shield(settings)

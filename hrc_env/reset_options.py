@@ -41,11 +41,11 @@ from hrc_env.tasks.task import AnyTask
 class ResetOptions:
     """Fixed parts of an episode; the field names are the keys of `reset(options={...})`.
 
-    An instance of this class is also accepted in place of the mapping. All other parts are drawn
+    An instance of this class is also accepted in place of the mapping. All other parts are sampled
     from the same random streams as without options. A vector environment takes one value for all
-    environments; for `goal`, `start_q`, `n_workers` and `steps_left`, it also takes an array with a
-    row for each environment; and the key "each" takes a list with a mapping (or None) for each
-    environment. `set_options` takes all fields except `steps_left`, for all future resets,
+    environments. For `goal`, `start_q`, `n_workers` and `steps_left`, it also takes an array with a
+    row for each environment. Its additional key "each" takes a list with a mapping (or None) for
+    each environment. `set_options` takes all fields except `steps_left`, for all future resets,
     including those after the end of an episode.
     """
 
@@ -61,12 +61,12 @@ class ResetOptions:
     """Behaviour of workers towards the robot, as for `EnvConfig.people`."""
     activity: "str | Sequence[str | None] | None" = None
     """First activity of all workers, such as "hammer", or a list with one for each worker (None for
-    a random one); further activities are drawn as usual."""
+    a random one); all further activities are sampled."""
     start_q: ArrayLike | None = None
     """(N,) initial joint positions of the robot: angles [rad], or displacements of slides [m]."""
     cameras: Any = None
-    """Rig, as for `EnvConfig.cameras`; its cameras must have names of the environment's cameras,
-    but need not be all of them. From a `RigDistribution`, the rig is drawn."""
+    """Rig, as for `EnvConfig.cameras`. Its cameras must have names of the environment's cameras,
+    some of which may be missing. If a `RigDistribution` is given, the rig is sampled from it."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = None
     """Faults of cameras, which replace the environment's `faults`."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
@@ -81,7 +81,7 @@ NAMES = tuple(each.name for each in dataclasses.fields(ResetOptions))
 OF_SEVERAL = ("reset_mask", "each")
 """Options that only vector environments accept."""
 ONE_RESET = ("steps_left",)
-"""Options that `set_options` does not accept, because they apply to a single reset only."""
+"""Options that apply to a single reset only, and that `set_options` therefore rejects."""
 Options: TypeAlias = Mapping[str, Any]
 """Type of a mapping of options by name."""
 
@@ -135,7 +135,7 @@ def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[
 class Fixed:
     """Fixed parts of one environment's episode, after they have been checked.
 
-    A part that is None is drawn, or is that with which the environment was made.
+    A part that is None is sampled, or is taken from the arguments of the environment.
     """
 
     goal: Floats | None = None
@@ -147,7 +147,7 @@ class Fixed:
     rig: tuple[CameraConfig, ...] | None = None
     """Fixed rig, or the nominal rig of `rigs`."""
     rigs: RigDistribution | None = None
-    """Distribution from which the rig is drawn."""
+    """Distribution from which the rig is sampled; None for a fixed rig."""
     faults: tuple[FaultConfig, ...] | None = None
     """Faults of cameras."""
     appearance: AppearanceConfig | None = None
@@ -155,7 +155,7 @@ class Fixed:
 
     @property
     def changes_cameras(self) -> bool:
-        """Whether rig, faults or appearance are fixed, rather than those of the environment."""
+        """Whether options fix the rig, the faults or the appearance of the episode."""
         return any(each is not None for each in (self.rig, self.rigs, self.faults, self.appearance))
 
 
@@ -164,13 +164,13 @@ class Room:
     """Settings of an environment against which options are checked."""
 
     task: AnyTask
-    """The task."""
+    """Task of the environment."""
     scene: Scene
-    """The scene with the environment's rig."""
+    """Scene with the environment's rig."""
     chain: SerialChain
     """Kinematics of the robot."""
     level: str
-    """Perception level."""
+    """Perception level of the environment, as for `EnvConfig.perception`."""
     faults: tuple[FaultConfig, ...]
     """Faults of the environment's cameras."""
     appearance: AppearanceConfig
@@ -180,7 +180,7 @@ class Room:
     mind: BehaviourParams
     """Parameters of the workers' behaviour."""
     find_contact: Callable[[JointAngles], str | None]
-    """Function of joint angles that returns the names of two geoms in contact, or None."""
+    """Callable that returns the names of two geoms in contact at given joint angles, or None."""
     images: ObservedImages | None = None
     """Renderer of the images in observations; None without images."""
     wants_pairs: str = ""
@@ -193,7 +193,7 @@ class ChosenRig(NamedTuple):
     rig: tuple[CameraConfig, ...] | None = None
     """The rig, or the nominal rig of the distribution; None without the option."""
     distribution: RigDistribution | None = None
-    """Distribution from which the rig is drawn; None for a fixed rig."""
+    """Distribution from which the rig is sampled; None if the rig is fixed."""
 
 
 def fix(options: Options, room: Room) -> Fixed:
@@ -276,7 +276,7 @@ def _start_q(start_q: Any, room: Room) -> JointAngles | None:
 
 
 def _cast(given: Options, room: Room) -> Cast | None:
-    """Return number, bodies, first activities and behaviour of the workers."""
+    """Return the fixed number, bodies, activities and behaviour of workers; None if none is."""
     if not {"n_workers", "bodies", "people", "activity"} & set(given):
         return None
     most, n = room.scene.n_workers, None
@@ -313,7 +313,7 @@ def _activity_index(name: str | None) -> int:
 
 
 def _one_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
-    """Return a list with one value for each worker, from a common value or such a list."""
+    """Return a list with one value for each worker, given a common value or such a list."""
     if value is None:
         return None
     if isinstance(value, str):

@@ -1,6 +1,6 @@
-"""The reward of an environment, composed of terms that are declared once.
+"""The reward of an environment, which is the sum of declared terms.
 
-Terms about people read only the estimate; the progress of the task is measured in the true world.
+Terms about people read only the estimate; the progress of the task is computed from the true state.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,13 +24,13 @@ class RewardConfig:
     """Weights of the reward terms that all tasks share.
 
     The weights of all other terms are among the settings of the task. A learner that is penalized
-    for closeness before it has learned its task learns to stand still, far from people. Increase
-    the weight of `proximity` gradually from 0 (`set_reward`; `train --ramp`), and compare numbers
-    of reached goals instead of returns, which depend on the weights.
+    for closeness from the start learns to stand still, far from people, before it learns the task.
+    Increase the weight of `proximity` gradually from 0 (`set_reward`; `train --ramp`), and compare
+    numbers of reached goals instead of returns, which depend on the weights.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {"unknown": "unknown_closeness"}
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     effort: float = 0.02
     """Weight of the penalty on the mean squared action."""
@@ -52,21 +52,21 @@ class RewardConfig:
 
 
 KINDS = ("dense", "sparse")
-"""Valid values of a task's setting `reward`: with or without a reward for progress."""
+"""Valid values of the setting `reward` of tasks: with or without a reward for progress."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
-    """One term of the reward, which is the sum of all terms."""
+    """Term of the reward, which is the sum of all terms."""
 
     name: str
     """Name of the term; its value is `info["reward/NAME"]`."""
     doc: str
-    """Sentence for the environment's page."""
+    """Description of the term for the environment's documentation page, in one sentence."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
-    """Function of (belief, step, previous action (B, A), weights) that returns the values (B,) of
-    the term. The step is the result of `Task.advance`. The weights are a `RewardConfig` for shared
+    """Callable (belief, step, previous action (B, A), weights) that computes the values (B,) of the
+    term. The step is the result of `Task.advance`. The weights are a `RewardConfig` for shared
     terms, and the task's settings for terms of the task. Useful fields of the belief are
     `separation.distance_m` (B, W), `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J,
     3), all in metres."""
@@ -101,7 +101,7 @@ def _progress(belief: Belief, step: Any, previous: Floats, config: Any) -> Float
 
 
 def closeness(separation_m: Floats, reach_m: float) -> Floats:
-    """Return the shape of the proximity term: 0 beyond `reach_m`, 1 at contact, 2.25 at most."""
+    """Return the unweighted proximity penalty: 0 beyond `reach_m`, 1 at contact, at most 2.25."""
     share = np.minimum(np.maximum((reach_m - separation_m) / reach_m, 0.0), 1.5)
     return share * share
 
@@ -176,7 +176,11 @@ def evaluate_terms(
 
 
 def check_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:
-    """Return factors on terms by name; raise `ConfigError` for unknown names or invalid factors."""
+    """Check factors on reward terms, and return them as floats by name.
+
+    Raises:
+        ConfigError: a name is unknown, or a factor is not a finite number.
+    """
     names = [term.name for term in terms]
     check_names("reward term", factors, names)
     for name, factor in factors.items():
@@ -197,8 +201,8 @@ def sum_terms(terms: Mapping[str, Floats], batch: int) -> Floats:
 
     Raises:
         ConfigError: the shape of a term is wrong.
-        FloatingPointError: a term is not finite, which is due to an error in code and never to a
-            camera.
+        FloatingPointError: a term is not finite, which indicates an error in the code and never a
+            fault of a camera.
     """
     for name, value in terms.items():
         check_shape(f"reward term {name!r}", np.shape(value), (batch,), "one value per environment")

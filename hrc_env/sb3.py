@@ -57,8 +57,8 @@ class HRCVecEnv(VecEnv):
     Args:
         num_envs: number of environments.
         stagger: whether the first episode of each environment after `seed()` ends early, at a
-            random time, so that a short rollout covers all phases of an episode; not for
-            evaluation.
+            random time, so that a short rollout covers all phases of an episode. Do not use this
+            for evaluation.
         seed: seed of the first reset.
         infos: names of infos to include in every step, or patterns such as "safety/*".
         kwargs: arguments of `HRCVectorEnv`.
@@ -103,7 +103,7 @@ class HRCVecEnv(VecEnv):
         return self._member(0).spec
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
-        """Set the seed of environment k at the next reset to seed + k; None draws a seed."""
+        """Set the seed of environment k at the next reset to seed + k; None samples a seed."""
         seeds = list(super().seed(seed))
         self._phases = np.random.default_rng(seeds[0]) if self.stagger else None
         return seeds
@@ -239,7 +239,7 @@ class HRCVecEnv(VecEnv):
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * len(chosen)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return for each environment whether a wrapper is among those that this class replaces."""
+        """Return for each chosen environment whether this class replaces a wrapper."""
         limited = self.env.max_episode_steps != ENDLESS
         done = (*REPLACED, TimeLimit) if limited else REPLACED
         wrapped = any(issubclass(each, wrapper_class) for each in done)
@@ -327,14 +327,14 @@ class HRCSubprocVecEnv(SubprocVecEnv):
 
 
 def _one_each(options: Any, num_envs: int) -> Sequence[Any]:
-    """Return a list with the options of each environment, from a common mapping or such a list."""
+    """Return a list with the options of each environment, given a common mapping or such a list."""
     each = options if isinstance(options, (list, tuple)) else [options] * num_envs
     check_shape("options", (len(each),), (num_envs,), "one mapping per environment")
     return each
 
 
 class Past(NamedTuple):
-    """Statistics of a finished episode, as recorded by `Monitor`."""
+    """Statistics of a finished episode, equivalent to those of SB3's `Monitor`."""
 
     reward: float
     """Return of the episode."""

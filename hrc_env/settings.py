@@ -31,7 +31,7 @@ PARTS = {
     "faults": "faults",
     "appearance": "appearance",
 }
-"""Paths in `config` of the parts that arguments of an environment replace, by argument."""
+"""Path of the field in `config` that an argument of the environment replaces, by argument."""
 
 
 class WorkerCounts(NamedTuple):
@@ -50,26 +50,26 @@ class Settings:
     asked: EnvConfig
     """Arguments with which the environment was made."""
     task: AnyTask
-    """The task, an instance with its settings."""
+    """Instance of the task, with its settings."""
     estimator: EstimatorSpec
-    """The estimator."""
+    """Specification of the estimator."""
     cameras: Any
     """Names and indices of the scene's cameras in use; None for all."""
     scene: str
     """Name of the scene."""
     robot: Robot
-    """The robot."""
+    """Robot of the environment."""
     n_workers: WorkerCounts
     """Bounds on the number of workers in an episode."""
     shield: Shield | None
-    """The shield; None for no shield."""
+    """Function of the shield; None for no shield."""
     config: HRCConfig
-    """All other settings."""
+    """Settings that are not keyword arguments of an environment."""
     images: ImageConfig | None = None
     """Settings of the camera images in the observation; None for no images."""
     rigs: RigDistribution | None = None
-    """Distribution from which every episode's rig is drawn; None if all episodes have the same
-    rig."""
+    """Distribution from which the rig of every episode is sampled; None if all episodes have the
+    same rig."""
 
     def describe(self, batch: int, scene: Scene) -> dict[str, Any]:
         """Return the settings that must be equal for a state to be restored in another simulation.
@@ -95,7 +95,7 @@ class Settings:
 
 
 def resolve_settings(**arguments: Any) -> Settings:
-    """Return checked settings for keyword arguments of an environment, like `make_settings`."""
+    """Return the checked settings for keyword arguments of an environment."""
     return make_settings(EnvConfig(**arguments))
 
 
@@ -190,7 +190,7 @@ def _camera(given: Any, index: int) -> CameraConfig:
 
 
 def _parse_worker_counts(n_workers: int | tuple[int, int]) -> WorkerCounts:
-    """Return the bounds on the number of workers, from one number or a pair of bounds."""
+    """Return the bounds on the number of workers, given one number or a pair of bounds."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
     are_whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not are_whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:

@@ -1,4 +1,4 @@
-"""The closed loop of a batch of environments: act, move, perceive, judge.
+"""Closed loop of a batch of environments: control, motion, perception and evaluation.
 
 `HRCEnv` is a simulation with a batch of one. The results of environment b depend only on the random
 streams of that environment, never on the size of the batch.
@@ -56,8 +56,8 @@ CLOSING_M_S = 8.0
 """Upper bound on the speed at which robot and worker approach each other [m/s]. The maximum in
 about 290,000 steps of robots that moved back and forth at their limits was 3.4."""
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
-"""Random streams of an environment, in the order in which their generators are spawned. They are
-separate, so that the workers' motion does not depend on the perception."""
+"""Random streams of an environment, in the order in which their generators are spawned. Separate
+streams make the workers' motion independent of the perception."""
 MEASURING = "objects"
 """Random stream for measurements of loose objects, spawned from that of the task."""
 
@@ -67,7 +67,7 @@ class Command:
     """Commands of the robots in a step."""
 
     velocities: JointVelocities
-    """(B, N) joint velocities that the shield allows [rad/s], of slides [m/s]."""
+    """(B, N) joint velocities that the shield allows [rad/s], or [m/s] for slides."""
     previous_action: Floats
     """(B, A) actions of the previous step."""
     shield_info: Info
@@ -76,7 +76,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The true state of the world for sensors, task, cost and metrics; beliefs never read it."""
+    """True state of the world for sensors, task, cost and metrics, which beliefs never contain."""
 
     ids: Ints
     """(B,) index of the environment of each row."""
@@ -158,16 +158,18 @@ class Simulation(Stateful):
         )
         self.physics = Physics(self.scene, batch)
         self.cameras = EpisodeCameras(batch, settings, self.scene)
-        """Cameras of every environment's episode."""
+        """Cameras and perception pipelines of the environments."""
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.reward_factors: dict[str, float] = {}
-        """Factors on terms of the reward by name; other terms have the factor 1."""
+        """Factors by which reward terms are multiplied, by name; all other terms have the factor
+        1."""
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
         self.estimates = tuple(oracle.estimate_prior(*made) for _ in (0.0, *config.forecast_s))
-        """Estimates of the workers: the present one, and a forecast for each of `forecast_s`."""
+        """Estimates of the workers: the current estimate, and a forecast for each of
+        `forecast_s`."""
         self.identities = metrics.make_identities(batch, self.scene.n_workers)
         self.keys: list[str] = []
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
@@ -208,7 +210,7 @@ class Simulation(Stateful):
         return self._judge(command, truth, belief)
 
     def fix(self, options: Options) -> Fixed:
-        """Return the fixed parts of one environment's episode.
+        """Check the options of one environment's reset, and return the fixed parts of its episode.
 
         Raises:
             ConfigError: an option is invalid, or two options are incompatible.
@@ -235,8 +237,8 @@ class Simulation(Stateful):
 
         Args:
             weights: weights of the terms that all tasks share; None keeps them.
-            factors: factors on any terms by name, also on those of the task; all other terms have
-                the factor 1. None keeps the factors.
+            factors: factors by which terms are multiplied, by name, including terms of the task;
+                all other terms have the factor 1. None keeps the factors.
 
         Raises:
             ConfigError: a term is unknown, or a factor is not a finite number.
@@ -253,11 +255,11 @@ class Simulation(Stateful):
         self.reward_factors = self.reward_factors if checked is None else checked
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
-        """Return the rig of environment b's episode."""
+        """Return the rig of environment `b` in its current episode."""
         return self.cameras.rig_of(b)
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the pinhole cameras of environment b's episode, with their matrices."""
+        """Return the pinhole cameras of environment `b` in its current episode."""
         return self.cameras.cameras_of(b)
 
     def get_state(self) -> State:
@@ -282,7 +284,7 @@ class Simulation(Stateful):
         return self.cameras.draw_images(self.streams["sensor"])
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance drawn for environment b's episode; None for the scene as built."""
+        """Return the appearance sampled for environment `b`; None for the scene as built."""
         return self.cameras.look_of(b, self.streams["sensor"][b])
 
     def close(self) -> None:
@@ -301,7 +303,7 @@ class Simulation(Stateful):
 
     @property
     def estimate(self) -> PoseEstimate:
-        """Present estimate of the workers."""
+        """Current estimate of the workers."""
         return self.estimates[0]
 
     @property
@@ -312,12 +314,12 @@ class Simulation(Stateful):
 
     @property
     def present(self) -> Bools:
-        """(B, W) whether each worker is in the scene."""
+        """Mask (B, W) of the workers that are in the scene."""
         return generator.activity(self.motion) != generator.ABSENT
 
     @property
     def belief(self) -> Belief:
-        """Present belief of every robot."""
+        """Current belief of every robot."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         world = handling.make_world(self.physics, self._everyone, robot)
         return self._believe(self._everyone, self._load(world), self.estimates)
@@ -328,7 +330,7 @@ class Simulation(Stateful):
         return self.task.markers(view)[0]
 
     def _make_people_and_scene(self, settings: Settings) -> None:
-        """Make the workers and the scene, or raise `ConfigError` if the space is insufficient."""
+        """Make the workers and the scene; raise `ConfigError` if it lacks space for workers."""
         config, (fewest, most) = settings.config, settings.n_workers
         build_scene = partial(
             build,
@@ -442,7 +444,7 @@ class Simulation(Stateful):
         return Truth(self._everyone, world, motion, workers, paths, task_step)
 
     def _show_workers(self, world: World, motion: WorkerMotion) -> WorkerProgress | None:
-        """Let workers see robot and signals; return their progress if they wait for signals."""
+        """Let workers observe robot and signals; return their progress if they wait for signals."""
         seen_world = world.robot.capsules_world[:, self.scene.watched_capsules, 1]
         signal = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, self.config.ctrl_dt, signal)
@@ -470,7 +472,7 @@ class Simulation(Stateful):
         return self._believe(ids, truth.world, estimates)
 
     def _expose(self, truth: Truth) -> None:
-        """Expose the sensor to the world; no other part of the perception has access to it."""
+        """Expose the sensor; no other part of the perception has access to the true state."""
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
@@ -483,8 +485,8 @@ class Simulation(Stateful):
 
         Args:
             ids: (n,) indices of the environments.
-            world: world of these environments, from which readings of encoders and grippers are
-                taken.
+            world: true state of these environments, from which only the readings of encoders and
+                grippers are used.
             estimates: estimate of the workers, and its forecasts.
         """
         estimate = estimates[0]
@@ -506,7 +508,7 @@ class Simulation(Stateful):
         return replace(belief, allowed_contact=self.task.allowed_contact(belief))
 
     def _open(self, truth: Truth, belief: Belief) -> StepResult:
-        """Return the observations and infos of episodes that begin."""
+        """Return the initial observations and infos of new episodes."""
         ids, task, world = truth.ids, self.task, truth.world
         present, nothing = self.present[ids], np.zeros(len(ids))
         identities = metrics.make_identities(*present.shape)
@@ -522,7 +524,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), nothing, nothing > 0, info)
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
-        """Compute cost and metrics from the truth, and reward and observation from the belief."""
+        """Compute cost and metrics from the true state, reward and observation from the belief."""
         config, paths = self.config, require(truth.paths, "The true paths of a step")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
@@ -553,7 +555,7 @@ class Simulation(Stateful):
         return over.astype(bool)
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
-        """Return the initial joint angles (n, N) of robots `ids` (n,), drawn or given."""
+        """Return the initial joint angles (n, N) of robots `ids`, sampled or fixed by options."""
         rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
@@ -565,7 +567,7 @@ class Simulation(Stateful):
         return q
 
     def _load(self, world: World) -> World:
-        """Return a world in which carried loads are parts of the robots."""
+        """Return the true state with carried loads as parts of the robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
         return handling.attach_load(
             self.scene, world, arm, qpos, self.task.is_load(self.task_state)

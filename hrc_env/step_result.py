@@ -12,8 +12,8 @@ from hrc_env.core.infos import Info, InfoDict, publish
 from hrc_env.core.typing import Bools, Floats
 
 Observation = NDArray[np.float32] | dict[str, NDArray[Any]]
-"""Type of observations: (B, n) float32, or a dictionary if there are also goals or images
-(uint8)."""
+"""Type of observations: an array (B, n) of float32, or a dictionary of arrays if there are also
+goals or images (uint8)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +25,9 @@ class StepResult:
     reward: Floats
     """(B,) rewards of the step."""
     terminated: Bools
-    """(B,) whether each episode has terminated."""
+    """Mask (B,) of the environments in which the episode has terminated."""
     info: Info
-    """Infos (B,) by name."""
+    """Entries of the info: arrays (B,) by name."""
 
     def info_of(self, b: int) -> InfoDict:
         """Return the info of one environment with NumPy scalars as values."""
@@ -35,7 +35,7 @@ class StepResult:
 
 
 def check_keys(keys: list[str], info: Info) -> Info:
-    """Return an info, after a check that it has the same names as the first one.
+    """Check that an info has the same names as the first one, and return it.
 
     Args:
         keys: names of the first info; an empty list is filled with the names of this one.

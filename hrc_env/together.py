@@ -1,4 +1,4 @@
-"""Check that a task's environments depend neither on each other nor on state outside of them."""
+"""Check that environments of a task depend neither on each other nor on hidden state."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from hrc_env.step_result import StepResult
 SEEDS = (0, 1)
 """Seed of the first episode of each environment."""
 N_STEPS = 4
-"""Number of control steps after a reset, or after a state was restored."""
+"""Number of control steps after each reset and each restored state."""
 RULE = (
     "All methods work on rows: draw random numbers for environment b from rngs[b], write and "
     "return only the rows of `ids`, and do not reduce (sum, mean, maximum) over the first axis."
@@ -56,7 +56,7 @@ def _collect(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
 
 
 def _play(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
-    """Yield the results of resets and steps, some of which are repeated from a restored state."""
+    """Yield the results of resets and steps; repeat some steps from a restored state."""
     batch = len(seeds)
     with closing(Simulation(batch, settings)) as simulation:
         everyone = np.arange(batch)

@@ -1,4 +1,4 @@
-"""Records for the exchange between scene, workers and tasks, such as signals and the true world.
+"""Records that scene, workers and tasks exchange, such as signals and the true state of the world.
 
 A task reads and writes these records; none of them is part of a belief.
 """
@@ -17,7 +17,7 @@ FOOT_M = (-0.75, 0.0, 0.75)
 FOOT_WORLD = np.array(FOOT_M)
 """Position of the base of stationary robots in every scene [m]."""
 AWAY_M = 0.43
-"""Distance between a worker at a workplace and the loads in front, on the floor or a table [m]."""
+"""Distance between a worker at a workplace and the loads in front of the worker [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +33,13 @@ class Workplace:
     yaw_rad: float
     """Heading of the worker, measured from world +x [rad]."""
     height_m: float
-    """Height above the floor of the hands at work, of the surface with the loads, or of a step [m];
-    0 if it does not apply."""
+    """Height above the floor [m] of the hands at work, of the surface with the loads, or of a step,
+    depending on `kind`; 0 if none of them applies."""
     ahead_m: float = AWAY_M
     """Distance between the worker and the loads, cart handles or wall in front [m]."""
     loads: tuple[str, ...] = ()
-    """Names of the props that are initially stacked there, from the bottom up, from
-    `props.PROPS`."""
+    """Names of the props (`props.PROPS`) that are initially stacked at the workplace, from the
+    bottom up."""
 
 
 WORKPLACE_KINDS = (
@@ -55,8 +55,8 @@ WORKPLACE_KINDS = (
     "task",
 )
 """Kinds of workplaces, in this order: beside the robot with the hands in its workspace, at a table,
-on the knees, at a wall, above the head, at a pile of material, at a cart, in front of a step 0.3 m
-ahead, on open floor, and at an object of the task."""
+kneeling on the floor, at a wall, above the head, at a pile of material, at a cart, in front of a
+step 0.3 m ahead, on open floor, and at an object of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,14 +76,14 @@ class Grounds:
     """Position of the robot's first joint axis, x and y in the world [m]; the robot faces world
     +x."""
     robot_clearance_m: float
-    """Distance that workers' paths keep from that axis [m]: the pedestal's radius plus half the
-    width of a person."""
+    """Minimum distance of workers' paths from the robot's first joint axis [m]: the pedestal's
+    radius plus half the width of a person."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Weld:
-    """A connection that keeps the distance of two sites while it is active; initially inactive."""
+    """Connection of two sites that keeps their relative pose while active; initially inactive."""
 
     name: str
     """Name of the weld in `Effects.welded`."""
@@ -92,7 +92,8 @@ class Weld:
     solref: tuple[float, float] = (0.02, 1.0)
     """Stiffness and damping of the constraint: MuJoCo's `solref`."""
     turns: bool = True
-    """Whether the relative rotation of the sites is also kept."""
+    """Whether the relative rotation of the sites is also kept, in addition to their relative
+    position."""
 
 
 @answer_unknown_fields
@@ -110,7 +111,7 @@ class TaskScene:
 
 
 NOTHING = TaskScene()
-"""Scene part of a task that adds nothing to the scene."""
+"""Empty part of a scene, for tasks that add nothing to the scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +119,13 @@ class WorkerProgress:
     """Progress of workers in their part of a task."""
 
     present: Bools
-    """(B, W) whether each worker is in the scene."""
+    """Mask (B, W) of the workers that are in the scene."""
     screws: Ints
     """(B, W) number of screws that each worker has driven."""
     boring: Bools
-    """(B, W) whether each worker is driving a screw."""
+    """Mask (B, W) of the workers that are driving a screw."""
     takes: Bools
-    """(B, W) whether each worker extends a hand to take an object that the robot brings."""
+    """Mask (B, W) of the workers that extend a hand to take an object from the robot."""
     grip_world: Points3
     """(B, W, 3) position of the grip point of each worker's active hand [m]."""
     grip_velocity_world: Velocities3
@@ -134,7 +135,7 @@ class WorkerProgress:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class WorkerSignal:
-    """A task's signal to the workers that wait for it."""
+    """Signal of a task to the workers that wait for it."""
 
     stage: Ints
     """(B,) stage of the task: 0 while workers wait, 1 when they may begin, 2 after one of them has
@@ -145,20 +146,20 @@ class WorkerSignal:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """The true state of robots and objects, by which a task is judged; a row per environment."""
+    """True state of robots and objects for the evaluation of a task, with a row per environment."""
 
     robot: RobotState
     """Joints and tool of the robot, as measured by the robot's encoders."""
     hand: HandState | None = None
-    """State of the gripper; None for an arm without a gripper."""
+    """State of the hand; None for a robot without a hand."""
     objects: ObjectState | None = None
     """True poses and velocities of the task's loose objects; None for a task without objects."""
     workers: WorkerProgress | None = None
     """Progress of workers that wait for signals (`Task.signal`); None if no worker waits, and at
     the start of an episode."""
     touched: Bools | None = None
-    """(B,) whether the robot touched a worker in this step. Because it is the truth, use it for the
-    success of an episode, but not for a reward or an observation."""
+    """Mask (B,) of the environments in which the robot touched a worker in this step. This is true
+    state: use it to determine the success of an episode, but not for a reward or an observation."""
     place: Any = None
     """The task's map of the scene, as returned by `Task.survey`."""
 
@@ -168,6 +169,6 @@ class Effects:
     """Welds and external forces that a task applies to its loose objects in a step."""
 
     welded: Mapping[str, Bools]
-    """(B,) whether each of the task's welds is active, by its name."""
+    """Mask (B,) of the environments in which a weld of the task is active, by name of the weld."""
     push_world: Floats
     """(B, O, 6) force [N] and torque [Nm] at the centre of each object, in the world frame."""

@@ -85,6 +85,11 @@ def test_a_former_key_of_infos_is_an_error_that_gives_the_present_one(former, pr
         info[former]
     with pytest.raises(KeyError, match=r"^'other'$"):
         info["other"]
+    with pytest.raises(KeyError, match=f"did you mean '{present}'"):
+        info[present[:-1]]
+    with pytest.raises(KeyError, match=re.escape(expected)):
+        info.get(former)
+    assert info.get("other", 2.0) == 2.0
     with pytest.raises(ConfigError, match=re.escape(expected)):
         infos.match_keys([former], [present])
 

@@ -1,1 +1,1 @@
-"""PPO by RLlib, with environments on many processes and machines, and a single learner."""
+"""PPO by RLlib, with environments in several processes or machines and a single learner."""

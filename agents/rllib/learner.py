@@ -28,37 +28,37 @@ from .policy_module import PolicyModule
 from .runner_env import RunnerEnv, make_envs, reported_errors
 
 ENVIRONMENT = "hrc_env"
-"""Name with which the environments are registered in RLlib."""
+"""Name under which the environments are registered in RLlib."""
 _LOGGER = logging.getLogger("ray.rllib")
-"""RLlib's logger of failing workers; its lines would interrupt the progress display."""
+"""RLlib's logger of failing workers, the lines of which would interrupt the progress display."""
 SEEDS_OF_RUN = 100_000
 """Difference between the seeds of successive runs, which must exceed the number of runners."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerSettings:
-    """Settings of the processes that step environments."""
+    """Settings of the runners, which are the processes that step environments."""
 
     keywords: Mapping[str, Any]
-    """Keyword arguments of `gymnasium.make`, and the task."""
+    """Keyword arguments of `gymnasium.make`, with the task under the key "task"."""
     n: int
     """Number of runners."""
     num_envs: int
-    """Number of environments of each runner."""
+    """Number of environments in each runner."""
     seed: int
     """Seed of environments and of exploration."""
     share: float
-    """Share of a core that a runner reserves; below 1 if there are fewer cores than runners."""
+    """Fraction of a core that a runner reserves; below 1 if there are fewer cores than runners."""
     registrations: Registrations
-    """Registrations of this process, which are repeated in the runners."""
+    """Registrations of tasks and components in this process, which are repeated in the runners."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """Data that were sampled for an update."""
+    """Statistics of the data that were sampled for an update."""
 
     n_steps: int
-    """Environment steps."""
+    """Number of environment steps."""
     episodes: list[dict[str, float]]
     """Statistics of the episodes that ended."""
     n_runners: int
@@ -78,11 +78,12 @@ class Sampled:
 
 
 class RLlibPPO:
-    """RLlib's PPO, with runners that step environments, and a learner on this machine.
+    """RLlib's PPO, with several runners that step environments and a learner on this machine.
 
     Args:
-        policy: learner with the policy to train, which does not change until `pull`.
-        settings: settings of PPO; a rollout has `n_steps` of every environment of every runner.
+        policy: learner of Stable-Baselines3 with the policy to train, which does not change until
+            `pull`.
+        settings: settings of PPO; a rollout has `n_steps` steps of each environment of each runner.
         runners: settings of the processes that step environments.
     """
 
@@ -142,7 +143,7 @@ class RLlibPPO:
             .debugging(seed=runners.seed * SEEDS_OF_RUN, log_level="ERROR")
             .reporting(min_time_s_per_iteration=None)
         )
-        # Actions are learnt as they are given to the environment, but for the clipping.
+        # RLlib learns from actions as they are sent to the environment, before they are clipped.
         config.normalize_actions, config.clip_actions = False, True
         self.algorithm = self._build(config)
         self.push()
@@ -151,16 +152,17 @@ class RLlibPPO:
         """Start the runners; raise `HRCError` if none can create its environments."""
         try:
             return config.build_algo()
-        except Exception as error:  # of RLlib, which has no runner to ask for spaces
+        except Exception as error:  # raised by RLlib if no runner knows the spaces
             _LOGGER.handlers = self._handlers
             if reason := self._reason():
                 raise HRCError(f"No worker could create its environments: {reason}") from error
             raise
 
     def push(self) -> None:
-        """Copy the policy's network, Adam's moments and the scale of rewards to RLlib.
+        """Copy the network, Adam's moments and the reward-normalization statistics to RLlib.
 
-        The learner receives the moments, the runners the scale, and both the network.
+        The learner receives the moments, the runners receive the statistics, and both receive the
+        network.
         """
         known = self.policy.policy
         weights, moments = known.state_dict(), known.optimizer.state_dict()
@@ -179,7 +181,7 @@ class RLlibPPO:
         self._each(lambda envs: envs.take_rewards_state(scale))
 
     def pull(self) -> None:
-        """Copy the learned network, Adam's moments and the scale of rewards to the policy."""
+        """Copy network, Adam's moments and reward-normalization statistics to the policy."""
 
         def give(learner: Any) -> Any:
             module = learner.module[DEFAULT_MODULE_ID].policy
@@ -189,17 +191,17 @@ class RLlibPPO:
         self.policy.policy.load_state_dict(weights)
         self.policy.policy.optimizer.load_state_dict(moments)
         for scale, _ in self._each(lambda envs: envs.rewards_state())[:1]:
-            ours = self._normalised.ret_rms  # each runner has its own, of as many steps
+            ours = self._normalised.ret_rms  # each runner has its own statistics, of as many steps
             ours.mean, ours.var, ours.count = scale.mean, scale.var, scale.count
 
     @property
     def _normalised(self) -> VecNormalize:
         found = self.policy.get_vec_normalize_env()
-        assert found is not None  # as `ppo.make_learner` makes it
+        assert found is not None  # as in `ppo.make_learner`
         return found
 
     def _each(self, do: Callable[[RunnerEnv], Any]) -> list[Any]:
-        """Call a function with the environments of each living runner; return the results."""
+        """Call a function with the environments of each running runner; return the results."""
         return self.algorithm.env_runner_group.foreach_env_runner(
             lambda runner: do(envs_of(runner)), local_env_runner=False
         )
@@ -235,13 +237,13 @@ class RLlibPPO:
         return ray.get(self._errors.last.remote())
 
     def close(self) -> None:
-        """Stop the runners."""
+        """Stop the runners and the learner."""
         self.algorithm.stop()
         _LOGGER.handlers = self._handlers
 
 
 def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
-    """Create the environments of a runner; RLlib adds their number to the context."""
+    """Create the environments of a runner from RLlib's context, which contains their number."""
     cluster.one_core()
     torch.set_num_threads(1)
     errors = context["errors"]
@@ -264,7 +266,10 @@ def envs_of(runner: EnvRunner) -> RunnerEnv:
 
 
 class GoOn(RLlibCallback):
-    """Passes the scale of rewards and the proximity weight of a living runner to restarted ones."""
+    """Callback that copies the state of a running runner's rewards to restarted runners.
+
+    The state consists of the reward-normalization statistics and the proximity weight.
+    """
 
     def on_env_runners_recreated(
         self, *, env_runner_group: Any, env_runner_indices: list[int], **kwargs: Any
@@ -284,22 +289,22 @@ class GoOn(RLlibCallback):
 
 
 class WorkerErrors:
-    """An actor of Ray that stores the last error of the workers."""
+    """A Ray actor that stores the last error of the workers."""
 
     def __init__(self) -> None:
         self._last = ""
 
     def report(self, error: str) -> None:
-        """Store the message of an error."""
+        """Store an error message."""
         self._last = error
 
     def last(self) -> str:
-        """Return the last message, or "" if there is none."""
+        """Return the last error message, or "" if there is none."""
         return self._last
 
 
 class LastError(logging.Handler):
-    """Stores the last error of a log."""
+    """Log handler that stores the last error."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -308,5 +313,5 @@ class LastError(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Store the last line of a log record."""
         lines = [line.strip() for line in record.getMessage().splitlines() if line.strip()]
-        if lines and lines[-1] != "NoneType: None":  # of `logger.exception` without one
+        if lines and lines[-1] != "NoneType: None":  # no exception was active
             self.message = lines[-1].rstrip(".")[:400]

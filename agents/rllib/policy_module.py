@@ -1,4 +1,4 @@
-"""The network of Stable-Baselines3's PPO as an RLlib module, with interchangeable policies."""
+"""The network of Stable-Baselines3's PPO as an RLlib module, with which policies are exchanged."""
 
 from typing import Any
 
@@ -11,16 +11,16 @@ from stable_baselines3.common.policies import ActorCriticPolicy, MultiInputActor
 
 
 class PolicyModule(TorchRLModule, ValueFunctionAPI):
-    """An `ActorCriticPolicy`, whose actions have a normal distribution.
+    """RLlib module with an `ActorCriticPolicy` and normally distributed actions.
 
-    `model_config["policy"]` holds its keyword arguments: `net_arch`, `activation_fn`,
-    `log_std_init`, and a class of feature extractors.
+    `model_config["policy"]` contains the policy's keyword arguments: `net_arch`, `activation_fn`,
+    `log_std_init`, and the class of the feature extractor.
     """
 
     policy: ActorCriticPolicy
 
     def setup(self) -> None:
-        """Create the network."""
+        """Create the policy's network."""
         is_dict = isinstance(self.observation_space, Dict)
         kind = MultiInputActorCriticPolicy if is_dict else ActorCriticPolicy
         self.policy = kind(
@@ -31,7 +31,7 @@ class PolicyModule(TorchRLModule, ValueFunctionAPI):
         )
 
     def _forward(self, batch: dict[str, Any], **kwargs: Any) -> dict[str, Any]:
-        """Return mean and log standard deviation of actions (B, 2 A)."""
+        """Return the mean and the log standard deviation of actions (B, 2 A)."""
         policy, seen = self.policy, batch[Columns.OBS]
         features: Any = policy.extract_features(seen, policy.pi_features_extractor)
         mean = policy.action_net(policy.mlp_extractor.forward_actor(features))

@@ -1,4 +1,4 @@
-"""Environments of an RLlib runner, in different phases of episodes, with scaled rewards."""
+"""Environments of an RLlib runner, in different phases of episodes and with normalized rewards."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -19,16 +19,17 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
 
 LARGEST_REWARD = 10.0
-"""Limit to which scaled rewards are clipped, as in Stable-Baselines3's `VecNormalize`."""
+"""Absolute value to which normalized rewards are clipped, as in `VecNormalize`."""
 
 
 def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any, Any]:
-    """Create environments that step together, on one thread.
+    """Create environments that are stepped together in one thread.
 
     Args:
         num_envs: number of environments.
-        keywords: keyword arguments of `gymnasium.make`, and the task. At level `pixels`, which has
-            no batched form, the environments are stepped one after the other.
+        keywords: keyword arguments of `gymnasium.make`, with the task under the key "task". At the
+            perception level `pixels`, which cannot be batched, the environments are stepped one
+            after the other.
     """
     known = {name: value for name, value in keywords.items() if name != "num_threads"}
     if known.get("perception") != "pixels":
@@ -47,9 +48,9 @@ def try_environment(keywords: Mapping[str, Any]) -> None:
 
 @contextmanager
 def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
-    """Report the message of an exception in the context, and raise the exception again.
+    """Report the message of an exception within the context, and re-raise the exception.
 
-    It may come from a user's custom task or estimator.
+    The exception may come from a user's custom task or estimator.
     """
     try:
         yield
@@ -60,15 +61,15 @@ def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
 
 
 class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
-    """Environments with scaled rewards and without infos, which summarize finished episodes.
+    """Environments with normalized rewards and statistics of finished episodes instead of infos.
 
-    A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
-    Stable-Baselines3 does. If `env` is an `HRCVectorEnv`, its first episodes end early at random
-    times, to cover all phases of an episode in a short rollout.
+    Rewards are divided by the running standard deviation of the discounted return, as in
+    `VecNormalize` of Stable-Baselines3. If `env` is an `HRCVectorEnv`, its first episodes end early
+    at random times, to cover all phases of an episode in a short rollout.
 
     Args:
-        env: environments that restart in the step after an episode's end.
-        gamma: discount per step.
+        env: environments that are reset in the step after the end of an episode.
+        gamma: discount factor per step.
         report: function that receives the message of an error in a reset or a step.
     """
 
@@ -83,7 +84,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         self.scale = RunningMeanStd()
         """Running statistics of discounted returns."""
         self.proximity: float | None = None
-        """Proximity weight that was set last, or None for that of the configuration."""
+        """Proximity weight that was last set, or None for the weight of the configuration."""
         self.finished: list[dict[str, float]] = []
         """Statistics of the episodes that ended since the last `take_finished`."""
         self._sums = EpisodeSums(self.num_envs)
@@ -92,7 +93,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation of the environments, or the first of several ones."""
+        """Simulation of the environments; the first one if there are several."""
         if isinstance(self.env, HRCVectorEnv):
             return self.env.simulation
         return self.env.get_attr("simulation")[0]  # type: ignore[attr-defined]  # SyncVectorEnv
@@ -101,8 +102,8 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         """Start all episodes.
 
         Args:
-            seed: seed of the runner; that of environment k is seed * num_envs + k.
-            options: replaced by random phases of episodes, except at level `pixels`.
+            seed: seed of the runner; the seed of environment k is seed * num_envs + k.
+            options: ignored; except at level `pixels`, episodes start in random phases.
         """
         first_seed = None if seed is None else seed * self.num_envs
         if isinstance(self.env, HRCVectorEnv):
@@ -115,13 +116,13 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         return observation, {}
 
     def step(self, actions: NDArray[Any]) -> tuple[Any, Floats, Any, Any, dict[str, Any]]:
-        """Step all environments; those with ended episodes are reset instead."""
+        """Step all environments; those with a finished episode are reset instead."""
         with reported_errors(self._report):
             observation, reward, terminated, truncated, infos = self.env.step(actions)
         self._sums.add(reward, infos)
         self._sums.begin(np.flatnonzero(self._ended))
         self._returns = np.where(self._ended, 0.0, self._returns * self.gamma + reward)
-        if not self._ended.all():  # their step was a reset
+        if not self._ended.all():  # their step is a reset
             self.scale.update(self._returns[~self._ended])
         scaled = np.clip(reward / np.sqrt(self.scale.var + 1e-8), -LARGEST_REWARD, LARGEST_REWARD)
         self._ended = np.logical_or(terminated, truncated)
@@ -136,7 +137,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         return taken
 
     def weigh_proximity(self, weight: float) -> None:
-        """Set the weight of the proximity to the estimated body from the next step on."""
+        """Set the weight of the reward's proximity term, starting with the next step."""
         self.proximity = weight
         weights = replace(self.simulation.config.reward, proximity=weight)
         if isinstance(self.env, HRCVectorEnv):
@@ -145,11 +146,11 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
             self.env.call("set_reward", weights)  # type: ignore[attr-defined]  # SyncVectorEnv
 
     def rewards_state(self) -> tuple[RunningMeanStd, float | None]:
-        """Return the scale of rewards, and the proximity weight that was set last."""
+        """Return the reward-normalization statistics and the last proximity weight that was set."""
         return self.scale, self.proximity
 
     def take_rewards_state(self, scale: RunningMeanStd, proximity: float | None = None) -> None:
-        """Take over another runner's scale of rewards, and its proximity weight if it was set."""
+        """Adopt the reward-normalization statistics and, if given, the weight of another runner."""
         self.scale = scale
         if proximity is not None:
             self.weigh_proximity(proximity)

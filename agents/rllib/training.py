@@ -1,4 +1,4 @@
-"""Training by RLlib, the same as by Stable-Baselines3 but with workers on a cluster."""
+"""Training by RLlib with workers on a cluster, equivalent to that by Stable-Baselines3."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -8,7 +8,7 @@ from rich.console import Console
 from stable_baselines3.common.utils import configure_logger
 
 from hrc_env.core.errors import HRCError
-from hrc_env.engines import cluster  # first: it says how Ray is installed where it is missing
+from hrc_env.engines import cluster  # first: its error explains how to install Ray
 from hrc_env.engines.registrations import pack
 
 from ..callbacks import Interrupt, Ramp, TrainingLog
@@ -19,7 +19,9 @@ from .runner_env import try_environment
 from .watch import Watch
 
 WITHOUT_STEPS = 5
-"""Number of successive updates without a step, because workers died, after which training stops."""
+"""Number of successive updates without environment steps (since all workers failed) after which
+training stops.
+"""
 
 
 def learn(
@@ -30,15 +32,15 @@ def learn(
     interrupt: Interrupt,
     console: Console,
 ) -> None:
-    """Continue the training of a policy up to its number of steps or an interrupt.
+    """Continue the training of a policy until its number of steps or an interrupt.
 
     Args:
         run: training arguments with task, budget and number of workers.
-        settings: settings of PPO; a rollout has `n_steps` of every worker's environments.
+        settings: settings of PPO; a rollout has `n_steps` steps of each environment of each worker.
         whole: weight of the proximity term after the ramp.
-        log: log of a PPO of Stable-Baselines3, which holds the network, Adam's moments and the
-            scale of rewards, and is saved in checkpoints.
-        interrupt: handler of Ctrl-C, which is checked before every update.
+        log: log of a PPO learner of Stable-Baselines3. This learner holds the network, Adam's
+            moments and the reward-normalization statistics, and is saved in checkpoints.
+        interrupt: handler of Ctrl-C, which is checked before each update.
         console: console for messages about the cluster.
 
     Raises:
@@ -72,7 +74,7 @@ def _updates(
 ) -> Iterator[tuple[float, Sampled]]:
     """Update the policy until all steps are done.
 
-    Yields the share of the proximity term and the data of each update.
+    Yields the factor on the proximity term's weight and the data of each update.
     """
     learner, ramp, without, n_restarts = log.learner, Ramp(run.ramp), 0, 0
     while learner.num_timesteps < run.timesteps and not interrupt.asked:

@@ -1,4 +1,4 @@
-"""Metrics of a run for Ray's dashboard and Grafana."""
+"""Metrics of a training run for Ray's dashboard and Grafana."""
 
 from ray.util.metrics import Counter, Gauge
 
@@ -6,10 +6,10 @@ from .learner import Sampled
 
 
 class Watch:
-    """Gauges and counters of a run in Ray, which exports them as `ray_hrc_env_...`.
+    """Gauges and counters of a training run, which Ray exports as `ray_hrc_env_...`.
 
     Args:
-        task: id of the task, with which the metrics are tagged.
+        task: id of the task, used as a tag of the metrics.
     """
 
     def __init__(self, task: str) -> None:
@@ -32,7 +32,7 @@ class Watch:
             each.set_default_tags({"task": task})
 
     def show(self, sampled: Sampled) -> None:
-        """Set the metrics from the data of an update."""
+        """Set the metrics from the statistics of an update."""
         facts = sampled.facts()
         for name, gauge in self._rates.items():
             gauge.set(facts[name])

@@ -1,1 +1,1 @@
-"""A gallery with pictures of every body, motion and scene, and a page that shows them."""
+"""A gallery with images of all bodies, motions and scenes, and a page that shows them."""

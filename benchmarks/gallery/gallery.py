@@ -1,4 +1,4 @@
-"""Creation of the pictures and the page of the gallery."""
+"""Creation of the images and the page of the gallery."""
 
 import html
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from hrc_env.motion.repertoire import SCENES
 from hrc_env.worker.body import load_body, worker_names
 
 VIEWS = 5
-"""Number of pictures of a scene."""
+"""Number of images of each scene."""
 
 
 STYLE = """
@@ -29,15 +29,15 @@ figure { margin: 0; } .wide { grid-column: 1 / -1; } img { width: 100%; }
 
 
 class Exhibit(NamedTuple):
-    """A picture in the gallery."""
+    """An image in the gallery, with its title and caption."""
 
     section: str
     file: str
-    """Path of the PNG, relative to the page."""
+    """Path of the PNG file, relative to the page."""
     title: str
     caption: str
     is_wide: bool
-    """Whether the picture has a row of its own."""
+    """Whether the image fills a row of the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class GalleryConfig:
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
-    """Render all pictures into a folder, and write its `index.html`; return the exhibits."""
+    """Render all images into a folder, write its `index.html`, and return the exhibits."""
     out.mkdir(parents=True, exist_ok=True)
     share = 1.0 / max(len(config.bodies) + len(config.motions) + VIEWS * len(config.scenes), 1)
     shown: list[Exhibit] = []
@@ -76,7 +76,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
         caption = f"{load_body(name).stature_m:.2f} m tall"
         hang(portrait(name), "Workers", name.replace("_", " "), caption, False)
     bodies = config.bodies or worker_names()
-    for k, body in enumerate(bodies):  # strips of one worker are drawn one after another
+    for k, body in enumerate(bodies):  # consecutive strips share a worker
         for name in config.motions[k :: len(bodies)]:
             hang(draw_strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
     write_page(shown, out, "python -m benchmarks gallery")
@@ -84,7 +84,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
 
 
 def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
-    """Write `index.html` to a folder of pictures, with the exhibits grouped by section."""
+    """Write `index.html` to the folder of images, with the exhibits grouped by section."""
     sections = groupby(exhibits, lambda exhibit: exhibit.section)
     body = "".join(
         f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'

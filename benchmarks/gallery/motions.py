@@ -1,4 +1,4 @@
-"""Film strips of scenes of the repertoire, with a camera that follows the worker."""
+"""Film strips of the motions in the repertoire, with a camera that follows the worker."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import SEGMENT, load_body
 
 FRAMES, FRAME_PX = 6, (300, 420)
-"""Number of frames in a strip, and width and height of each [px]."""
+"""Number of frames in a strip, and width and height of each frame [px]."""
 DT_S = 0.05
 HFOV_DEG, TARGET_M = 38.0, 0.92
-"""Horizontal field of view of the camera [deg], and height of the point it looks at [m]."""
+"""Horizontal field of view of the camera [deg], and height of the point at which it aims [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """The location of a scene on the site, and the position of its camera."""
+    """The pose at which a worker starts a motion on the site, and the position of the camera."""
 
     xy_m: tuple[float, float]
     """Position of the worker at the start [m]."""
@@ -37,9 +37,9 @@ class Stage:
 
 OPEN = Stage((1.6, -1.5), 0.0, -1.05, 3.1)
 LONG = Stage((-4.4, -2.2), 0.0, -0.85, 2.9)
-"""Stage of motions that cover a long path."""
+"""Stage for motions that cover a long path."""
 LADEN = Stage((-4.4, -2.2), 0.0, -0.85, 4.0)
-"""Stage of motions with a large load."""
+"""Stage for motions with a large load."""
 AT_TABLE, AT_STUDS = ("table", -1.05, 2.7), ("north_studs_1", -2.0, 3.0)
 STAGED: dict[str, tuple[str, float, float]] = {
     "hammer lightly": AT_TABLE,
@@ -51,11 +51,13 @@ STAGED: dict[str, tuple[str, float, float]] = {
     "drill overhead": ("lintel", -2.0, 3.0),
     "climb": ("hop_up", -1.3, 2.8),
 }
-"""Scenes at a workplace of the site: its name, and direction and distance of the camera."""
+"""Motions at a workplace of the site: name of the workplace, and direction [rad] and distance [m]
+of the camera.
+"""
 
 
 def draw_strip(name: str, body_name: str, seed: int = 0) -> Image:
-    """Render a scene of the repertoire as a film strip, an image (420, about 1800, 3)."""
+    """Render a motion of the repertoire as a film strip, an image (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
     stage = make_stage(name)
     me = make_worker(load_body(body_name), stage.xy_m, stage.yaw_rad)
@@ -76,7 +78,7 @@ def draw_strip(name: str, body_name: str, seed: int = 0) -> Image:
 
 
 def make_stage(name: str) -> Stage:
-    """Return the stage of a scene."""
+    """Return the stage for a motion."""
     if name in STAGED:
         where, aside_rad, away_m = STAGED[name]
         place = next(p for p in build(name="site").grounds.places if p.name == where)
@@ -87,7 +89,7 @@ def make_stage(name: str) -> Stage:
 
 
 def spread_frames(lengths: Sequence[int]) -> list[tuple[int, int]]:
-    """Return frames at equal intervals in films of given lengths, as pairs of film and row."""
+    """Return equally spaced frames of films with given lengths, as index pairs (film, frame)."""
     rows = [(film, row) for film, length in enumerate(lengths) for row in range(length)]
     shares = (np.arange(FRAMES) + 0.5) / FRAMES
     return [rows[int(share * len(rows))] for share in shares]

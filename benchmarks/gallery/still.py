@@ -1,4 +1,4 @@
-"""Still pictures: portraits of the workers, and scenes with people at work."""
+"""Still images: portraits of the workers, and scenes with people at work."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,10 +16,10 @@ from hrc_env.worker.body import load_body
 from hrc_env.world import Workplace
 
 EYE_M = 1.45
-"""Height of the cameras of portraits above the floor [m]."""
+"""Height above the floor of the camera for portraits [m]."""
 PORTRAIT_PX = (600, 900)
 SITTING = (0.75, -0.6, -0.2)
-"""Position x, y [m] and heading [rad] of workers in their portraits."""
+"""Position x, y [m] and heading [rad] of the worker in a portrait."""
 PLACE_PX = (1600, 900)
 CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
     "lab": (("robot_4", "lunge", 0.3), ("open_studs", "drill", 0.5)),
@@ -28,17 +28,19 @@ CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
         ("slab_floor_1", "kneel", 0.5), ("carts", "wheelbarrow", 0.35),
     ),
 }  # fmt: skip
-"""Workers in the pictures of a scene: workplace, scene of the repertoire, and share of its time."""
+"""Workers in the images of a scene: workplace, motion of the repertoire, and the moment as a
+fraction of the motion's duration.
+"""
 OVERVIEW = {"lab": "room", "site": "overview"}
-"""Name of the view that shows most of a scene, by scene."""
+"""Name of the view that shows most of the scene, by name of the scene."""
 
 
 def make_camera(
     target_world: Points3, turn_rad: float, away_m: float, hfov_deg: float, size_px: tuple[int, int]
 ) -> PinholeCamera:
-    """Return a camera that looks at a point (3,) [m] from a direction and a horizontal distance.
+    """Return a camera that aims at a point (3,) [m] from a given direction and distance.
 
-    The direction `turn_rad` is measured from world +x.
+    The direction `turn_rad` is measured from world +x; the distance `away_m` is horizontal.
     """
     x, y, _ = target_world
     eye = np.array([x + away_m * np.cos(turn_rad), y + away_m * np.sin(turn_rad), EYE_M])
@@ -59,7 +61,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
 
 
 def views(scene_name: str, body_name: str) -> dict[str, Image]:
-    """Render a scene with people at work: an overview, then the view of each camera."""
+    """Render a scene with people at work: an overview, and the view of each camera, by name."""
     cast = CASTS[scene_name]
     scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
     motion = _stack_workers([_move_at_work(scene, body_name, *role) for role in cast])
@@ -75,7 +77,7 @@ def views(scene_name: str, body_name: str) -> dict[str, Image]:
 def _move_at_work(
     scene: Scene, body_name: str, place_name: str, doing: str, share: float
 ) -> WorkerMotion:
-    """Return the motion of one worker (1, ...) at a share of the time of an activity."""
+    """Return the motion of one worker (1, ...) at a fraction `share` of an activity's duration."""
     place: Workplace = next(p for p in scene.grounds.places if p.name == place_name)
     me = make_worker(load_body(body_name), place.xy_m, place.yaw_rad)
     films = perform(REPERTOIRE[doing], me, np.random.default_rng(2), 0.05)
@@ -84,7 +86,7 @@ def _move_at_work(
 
 
 def _stack_workers(workers: list[WorkerMotion]) -> WorkerMotion:
-    """Combine several workers, each with arrays (1, ...), into one record (W, ...)."""
+    """Concatenate the motions (1, ...) of several workers to one record (W, ...)."""
 
     def joined(records: Sequence[Any], *names: str) -> list[Any]:
         return [np.concatenate([getattr(each, name) for each in records]) for name in names]

@@ -1,1 +1,1 @@
-"""Comparison of the workers' motion with measurements of people, by statistics."""
+"""Comparison of statistics of the workers' motion with measurements of people."""

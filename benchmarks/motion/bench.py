@@ -1,4 +1,4 @@
-"""The motion benchmark: statistics of every scene of the repertoire, played by several workers."""
+"""The motion benchmark: statistics of all motions of the repertoire for several workers."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -19,20 +19,20 @@ from hrc_env.motion.repertoire import SCENES, Film, make_worker, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
-"""Time between frames of a film [s], short enough for the computation of accelerations."""
+"""Time between frames [s], which is short enough for the computation of accelerations."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionBench:
-    """The experiment, and its amount of data."""
+    """Benchmark of the motion of workers by its statistics."""
 
     name = "bench motion"
     depends = ("motion",)
     n_parts = 1
     n_seeds: int = 12
-    """Number of times that each worker plays a scene, right-handed and left-handed in turn."""
+    """Number of films per worker and motion, alternately with the right and the left hand."""
     bodies: tuple[str, ...] = worker_names()
-    """Names of the bodies."""
+    """Names of the workers' bodies."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a number is invalid."""
@@ -42,15 +42,15 @@ class MotionBench:
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds, one per film of each worker."""
+        """Seeds of the films of each worker."""
         return list(range(self.n_seeds))
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Play and measure every scene."""
+        """Simulate and measure all motions of the repertoire."""
         metrics: dict[str, Metric] = {}
         for scene in SCENES:
             metrics |= _measure(scene, self)
@@ -58,11 +58,11 @@ class MotionBench:
         return metrics
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         seconds = [each.value for name, each in metrics.items() if name.endswith(".seconds")]
         lasting = min(seconds), max(seconds)
         short = describe_quick_run(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
@@ -70,13 +70,13 @@ class MotionBench:
 
 
 QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))
-"""The quick form, which computes every number from less data."""
+"""Benchmark settings for a quick run, which computes all numbers from less data."""
 
 
 def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
-    """Compute the statistics of a scene from its films.
+    """Compute the statistics of a motion from its films.
 
-    Each metric is the median over bodies, with the minimum and the maximum.
+    The value of each metric is the median over bodies; its interval is the range over bodies.
     """
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
@@ -96,7 +96,7 @@ def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
 
 
 def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
-    """Play a scene and return its films."""
+    """Simulate a motion of the repertoire and return its films."""
     me = make_worker(body, right=seed % 2 == 0)
     return perform(SCENES[scene], me, np.random.default_rng([17, seed]), DT_S)
 

@@ -17,11 +17,11 @@ COLUMNS = (
     Column("{}.grip_missed_share", "grips missed", 3),
     Column("{}.inside_itself_share", "in itself", 3),
 )
-"""Columns of the table that lists all scenes."""
+"""Columns of the table of all motions."""
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the report."""
+    """Return the report, with its tables and figures."""
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
         "Medians over bodies, with the smallest and the largest value in brackets. The first table "
@@ -37,7 +37,7 @@ def report(metrics: Metrics) -> Report:
 
 
 def inside(target: Target, metric: Metric) -> bool:
-    """Return whether the median over bodies is in the band of a target."""
+    """Return whether the median over bodies lies within the target band."""
     return target.low <= metric.value <= target.high
 
 

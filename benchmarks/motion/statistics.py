@@ -1,6 +1,6 @@
-"""Statistics of films: speeds, accelerations and errors of the workers' motion.
+"""Statistics of the workers' motion: speeds, accelerations and errors.
 
-The errors are slipping feet, hands that miss their targets, and self-intersection.
+The errors are slipping feet, hands that miss their targets, and self-intersections.
 """
 
 from collections.abc import Sequence
@@ -22,21 +22,22 @@ HEAD = [SEGMENT["head"]]
 MISSED_M = 0.01
 """Distance of a hand from its target above which it has missed the target [m]."""
 LOADED_M = 0.001
-"""Height of the ball of a foot above the ground below which the foot bears weight [m]."""
+"""Height above the ground of the ball of a foot, below which the foot is considered loaded [m]."""
 STEADY_SHARE = 0.97
-"""Share of the top speed above which a walk is steady."""
+"""Fraction of the top speed above which a walk is considered steady."""
 DEEP_M = 0.05
-"""Depth above which capsules count as intersecting [m]; capsules are rounder than limbs, and flesh
-is soft."""
+"""Depth above which capsules count as intersecting [m]. Smaller depths are ignored, since limbs are
+not exactly capsules and tissue is soft.
+"""
 
 
 def compute_statistics(films: Sequence[Film], body: Body) -> dict[str, float]:
-    """Compute the statistics over all frames of a scene's films."""
+    """Compute the statistics of a motion over all frames of its films."""
     numbers: dict[str, float] = {}
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
         speeds = np.concatenate([_speeds(film, which) for film in films])
         alike = name == "ankle" or films[0].activity == st.WALK
-        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the faster hand counts
+        speeds = speeds.ravel() if alike else speeds.max(1)  # at work, the faster hand is measured
         numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))
         numbers[f"{name}_max_m_s"] = float(speeds.max())
         rates = np.concatenate([_accelerations(film, which) for film in films])
@@ -58,19 +59,19 @@ def _percentile(values: Floats, share: float) -> float:
 
 
 def _speeds(film: Film, which: list[int]) -> Floats:
-    """Return the speeds (T, n) of the origins of segments [m/s]."""
+    """Return the speeds (T, n) of the origins of the given segments [m/s]."""
     return np.linalg.norm(film.motion.velocity_world[:, 0, which], axis=-1)
 
 
 def _accelerations(film: Film, which: list[int]) -> Floats:
-    """Return the accelerations of the origins of segments in all frames [m/s^2]."""
+    """Return the accelerations of the origins of the given segments in all frames [m/s^2]."""
     velocity = film.motion.velocity_world[:, 0, which]
     change = np.diff(velocity, axis=0) / np.diff(film.time_s)[:, None, None]
     return np.linalg.norm(change, axis=-1).ravel()
 
 
 def compute_slips(film: Film) -> Floats:
-    """Return the speeds of the balls of those feet that bear weight [m/s]."""
+    """Return the speeds of the balls of all loaded feet in all frames [m/s]."""
     grounds = np.unique(np.round([0.0, *film.worker.footprints[:, 4]], 4))
     found = []
     for side in SIDES:
@@ -84,7 +85,7 @@ def compute_slips(film: Film) -> Floats:
 
 
 def compute_grips(film: Film) -> Floats:
-    """Return positions (T, 2, 3) of the grips, beyond the wrists along the forearms [m]."""
+    """Return the grip positions (T, 2, 3), beyond the wrists along the forearms [m]."""
     place = film.motion.position_world[:, 0]
     both = []
     for side in SIDES:
@@ -100,18 +101,18 @@ def find_arrivals(film: Film) -> Bools:
 
 
 def compute_misses(film: Film) -> Floats:
-    """Return distances of hands from their targets [m].
+    """Return the distances of the hands from their targets [m].
 
-    Frames in which a hand has no target are left out.
+    Frames in which a hand has no target are excluded.
     """
     wished = film.controls[:, c.HAND_TARGET : c.HAND_TARGET + 6].reshape(-1, 2, 3)
     return np.linalg.norm(compute_grips(film) - wished, axis=-1)[find_arrivals(film)]
 
 
 def compute_depths(film: Film, body: Body) -> Floats:
-    """Return the maximum depth (T,) to which limbs intersect other parts of the body [m].
+    """Return the maximum depth (T,) of intersections of limbs with other body parts [m].
 
-    If there is no intersection, it is the negative clearance.
+    Without an intersection, the value is the negative clearance.
     """
     truth = worker_truth(body, film.motion)
     capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m[0, 0]
@@ -128,7 +129,7 @@ def compute_depths(film: Film, body: Body) -> Floats:
 
 
 def _pairs(body: Body) -> list[tuple[int, int]]:
-    """Return the pairs of capsules that should not intersect."""
+    """Return the index pairs of capsules that should not intersect."""
     at = {name: index for index, name in enumerate(body.capsule_names)}
     trunk = ("pelvis", "abdomen", "torso", "chest", "head")
     named = [(f"{side}_hand", part) for side in SIDES for part in trunk]
@@ -140,7 +141,7 @@ def _pairs(body: Body) -> list[tuple[int, int]]:
 
 
 def compute_gait(film: Film) -> dict[str, float]:
-    """Compute cadence, step length and width, bob and knee flexion of a straight walk."""
+    """Compute cadence, step size, vertical oscillation and knee flexion of a straight walk."""
     place, rate = film.motion.position_world[:, 0], film.motion.velocity_world[:, 0]
     ahead = place[-1, 0, :2] - place[0, 0, :2]
     ahead /= np.linalg.norm(ahead)
@@ -165,13 +166,13 @@ def compute_gait(film: Film) -> dict[str, float]:
 
 
 def _smooth(speed: Floats) -> Floats:
-    """Return the moving average of speeds over about half a second of a film at 100 Hz."""
+    """Return the moving average of speeds at 100 Hz over about half a second."""
     window = np.ones(51) / 51
     return np.convolve(np.pad(speed, 25, "edge"), window, "valid")
 
 
 def knee_flexion_deg(place: Floats, side: str) -> Floats:
-    """Return knee flexion (T,) from the origins of segments (T, 22, 3) [deg]; 0 is straight."""
+    """Compute knee flexion (T,) from segment origins (T, 22, 3) [deg]; 0 is a straight leg."""
     hip, knee, ankle = (place[:, SEGMENT[f"{side}_{n}"]] for n in ("thigh", "shank", "foot"))
     thigh, shank = knee - hip, ankle - knee
     cosine = (thigh * shank).sum(-1) / np.linalg.norm(thigh, axis=-1)

@@ -1,4 +1,4 @@
-"""Target bands for statistics of activities, from measurements of people, with their sources."""
+"""Target bands for statistics of motions, based on measurements of people, with their sources."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ CMU_WORK = "CMU motion capture, trials of manual work"
 CMU_ALL = "CMU motion capture, 99.9th percentile of real clips"
 JUDGEMENT = "judgement"
 WALKS_M_S = (0.8, 1.1, 1.3, 1.4, 1.8)
-"""Speeds of the walks [m/s]."""
+"""Speeds of the walks in the repertoire [m/s]."""
 ANY = "*"
-"""Name that stands for every scene."""
+"""Wildcard for all motions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A band in which a statistic of a scene should be, and its source."""
+    """A band within which a statistic of a motion should lie, and its source."""
 
     scene: str
     statistic: str
@@ -24,7 +24,7 @@ class Target:
 
 
 def _walk(speed: float) -> list[Target]:
-    """Return the bands of a walk at a speed [m/s], most within 10 % of fits to the trials."""
+    """Return the bands of a walk at a speed [m/s], mostly within 10 % of fits to trials."""
     name = format_walk(speed)
     cadence, length = 96.2 * speed**0.468, 0.345 + 0.286 * speed
     return [
@@ -37,7 +37,7 @@ def _walk(speed: float) -> list[Target]:
 
 
 def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
-    """Return the bands of wrists and ankles in a walk, within 10 % of 95th percentiles [m/s]."""
+    """Return the speed bands of wrists and ankles in a walk, within 10 % of 95th percentiles."""
     name = format_walk(speed)
     return [
         Target(name, "wrist_p95_m_s", 0.9 * wrist, 1.1 * wrist, CMU),
@@ -46,7 +46,7 @@ def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
 
 
 def format_walk(speed_m_s: float) -> str:
-    """Return the name of the scene of a walk at a speed."""
+    """Return the name of the motion that is a walk at a speed [m/s]."""
     return f"walk {speed_m_s:.1f} m/s"
 
 
@@ -74,5 +74,5 @@ TARGETS: tuple[Target, ...] = (
 
 
 def list_targets(scene: str) -> list[Target]:
-    """Return the bands of a scene."""
+    """Return the target bands of a motion."""
     return [target for target in TARGETS if target.scene in (scene, ANY)]

@@ -1,7 +1,7 @@
-"""The perception benchmark: speed of detection, accuracy, and the effects of faults.
+"""The perception benchmark: speed of detection, accuracy, and effects of camera faults.
 
-Each part is written to DIR/parts as soon as it is complete, and a run that was stopped continues
-there. Parts of other versions or settings are computed again. Times are measured last.
+Each part is written to DIR/parts as soon as it is complete, and an interrupted run continues from
+there. Parts with other versions or settings are computed again. Times are measured last.
 """
 
 import zlib
@@ -35,51 +35,53 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
-"""Rigs with cameras at the same positions, by the rows of their crops."""
+"""Names of rigs with equally placed cameras but different lenses, by name of the table row."""
 FIRST_SEED = 500
-"""Seed of the first episode, and of the crops."""
+"""Seed of the first episode and of the crops."""
 BLOCK = 5
-"""Number of episodes in a part, which limits the loss when a run is stopped."""
+"""Number of episodes in a part; small parts limit the loss when a run is interrupted."""
 
 Parts = dict[str, dict[str, Any]]
-"""Finished parts by label."""
+"""Results of completed parts, by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionBench:
-    """The experiment, and its amount of data."""
+    """Benchmark of perception from pixels and its emulator."""
 
     name = "bench perception"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
-    """Number of episodes at `pixels` by scene; the first ones in the lab are the baseline of
-    faults."""
+    """Number of episodes at `pixels`, by scene. The first episodes in the lab are the baseline for
+    faults.
+    """
     n_steps: int = 250
-    """Number of steps of these episodes."""
+    """Number of steps of each of these episodes."""
     n_faults: int = 4
-    """Number of episodes of every fault at `pixels`, in which the faulty camera alternates."""
+    """Number of episodes of each fault at `pixels`, over which the faulty camera alternates."""
     fault_steps: int = 150
-    """Number of steps of these episodes."""
+    """Number of steps of each of these episodes."""
     n_emulated: int = 20
-    """Number of episodes of every fault at `keypoints`, each of `n_steps` steps."""
+    """Number of episodes of each fault at `keypoints`; each episode has `n_steps` steps."""
     kinds: tuple[str, ...] = tuple(KINDS)
-    """Names of the faults."""
+    """Names of the camera faults."""
     bodies: tuple[str, ...] = worker_names()
     """Names of the bodies in the crops."""
     n_instants: int = 15
-    """Number of moments, with four crops each, of each body in each scene, and of each lens."""
+    """Number of moments for each body in each scene and for each lens, with four crops each."""
     emulator_rounds: int | None = 2
     """Number of times that each motion is rendered in each scene to compare the emulator with
-    pixels.
+    detections in images.
 
-    With 0, each is rendered once in one scene; with None, the emulator is left out.
+    With 0, each motion is rendered once in a single scene; with None, the emulator is not
+    evaluated.
     """
     cameras: tuple[int, ...] = (1, 2, 4)
-    """Numbers of cameras with which speed is measured."""
+    """Numbers of cameras for which the speed is measured."""
     workers: tuple[int, ...] = (1, 2)
-    """Numbers of workers with which speed is measured."""
+    """Numbers of workers for which the speed is measured."""
     speed_steps: int = 200
-    """Number of steps in a measurement of speed."""
+    """Number of steps in each measurement of speed."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a number is invalid."""
@@ -95,26 +97,26 @@ class PerceptionBench:
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds, one per episode."""
+        """Seeds of the episodes."""
         return [FIRST_SEED + k for k in range(max(n for _, n in self.episodes))]
 
     @property
     def n_parts(self) -> int:
-        """Number of parts."""
+        """Number of parts of the benchmark, which are cached separately."""
         return len(list(make_tasks(self)))
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Parts:
-        """Return all parts by label, each computed or from the cache."""
+        """Return the results of all parts by label, computed or from the cache."""
         tasks = list(make_tasks(self, cache.folder.parent / "figures"))
         cache = replace(cache, n_parts=sum(task.cost for task in tasks))
         away = [task for task in tasks if not task.is_here]
@@ -127,15 +129,15 @@ class PerceptionBench:
         return played
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played, self.n_faults, self.fault_steps)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         return TABLES
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(self, played, metrics, figures)
 
 
@@ -144,27 +146,27 @@ QUICK = PerceptionBench(
     n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
 )  # fmt: skip
-"""The quick form, which computes every number from less data."""
+"""Benchmark settings for a quick run, which computes all numbers from less data."""
 
 
 class Task(NamedTuple):
-    """One part of the benchmark."""
+    """A part of the benchmark, with the function that computes it."""
 
     label: str
     cost: float
-    """Approximate computing time, relative to other parts [s]."""
+    """Approximate computing time, relative to that of other parts [s]."""
     make: Callable[[PartProgress], dict[str, Any]]
     is_here: bool = False
-    """Whether the part runs alone in this process, because it measures time or draws."""
+    """Whether the part runs alone in this process, since it measures time or saves a figure."""
 
     @property
     def part(self) -> Part:
-        """The part of the study."""
+        """The part in the form that the cache requires."""
         return Part(self.label, self.make, weight=self.cost)
 
 
 def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
-    """Yield all parts, time measurements last; the part of the emulator saves a figure."""
+    """Yield all parts, with time measurements last; the part of the emulator saves a figure."""
     yield from _crops(config)
     yield from _episodes(config)
     yield from _faults(config)
@@ -175,7 +177,7 @@ def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator
 
 
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
-    """Yield measurements of speed in the lab with all numbers of cameras and workers.
+    """Yield the parts that measure speed in the lab with all numbers of cameras and workers.
 
     The largest rig is also measured on the site and with the other runtime.
     """
@@ -205,7 +207,7 @@ def _episodes(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _faults(config: PerceptionBench) -> Iterator[Task]:
-    """Yield every fault at the levels that simulate it, and a baseline for `keypoints`."""
+    """Yield the parts for all faults, and for the baseline at the level `keypoints`."""
     for kind in config.kinds:
         make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
         slow = 3.0 if kind == "motion_blur" else 1.2
@@ -224,7 +226,7 @@ def _play(seeds: list[int], n_steps: int, tick: PartProgress, **arguments: Any) 
 
 
 def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress) -> dict[str, Any]:
-    """Play episodes with a fault, in which the faulty camera alternates."""
+    """Simulate `n` episodes with a fault; the faulty camera alternates between episodes."""
     played: list[dict[str, Any]] = [{}] * n
     n_cameras = len(SCENES["lab"].cameras)
     for c in range(min(n_cameras, n)):
@@ -239,7 +241,7 @@ def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress)
 
 
 def _crops(config: PerceptionBench) -> Iterator[Task]:
-    """Yield crops of every body in every scene, and of one body by every lens and appearance."""
+    """Yield the parts with crops of all bodies and scenes, and of all lenses and appearances."""
     n, first = config.n_instants, config.bodies[0]
     cost = 3 + 0.12 * n
     for name, _ in config.episodes:
@@ -255,7 +257,7 @@ def _crops(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -> dict[str, Any]:
-    """Return the crops of n moments, over which the activities alternate."""
+    """Return the results in the crops of `n` moments; the activities alternate between moments."""
     scene, views = make(), list[View]()
     rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)

@@ -1,8 +1,9 @@
-"""Crops of workers at work, which are detected without a previous track.
+"""Detection of workers at work in image crops, without a previous track.
 
-The motion generator moves a worker, which is rendered with the arm near its home pose. Each camera
-provides a crop around the true joints, cut as in the pipeline. Crops are evaluated only if every
-joint is in the image, and neither room nor robot hides one ("in view").
+The motion generator moves a worker, which is rendered together with the arm near its home pose.
+Each camera provides a crop around the true joints, with the same window as in the pipeline. Crops
+are evaluated only if all joints are in the image and hidden neither by the room nor by the robot
+("in view").
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,13 +36,15 @@ from hrc_env.worker.body import load_body, worker_truth
 
 STEP_S = 0.04
 PAUSE_STEPS = (20, 80)
-"""Range of the number of steps between two moments (0.8 to 3.2 s), to vary the activity."""
+"""Range (min, max) of the number of steps between two moments (0.8 to 3.2 s), which varies the
+activity.
+"""
 PATIENCE = 200
-"""Number of moments without the desired activity after which another one is accepted."""
+"""Number of moments without the desired activity after which any activity is accepted."""
 
 
 class Instant(NamedTuple):
-    """A moment of a worker at work."""
+    """State of robot and worker at one moment."""
 
     activity: str
     q: JointAngles
@@ -52,23 +55,25 @@ class Instant(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """Detections of C cameras at one moment, as arrays (C,)."""
+    """Results of detection in C cameras at one moment; all fields have shape (C,)."""
 
     in_view: Bools
-    """Whether all joints are in the image, and neither room nor robot hides one."""
+    """Mask of cameras in which all joints are in the image and hidden neither by the room nor by
+    the robot.
+    """
     error: Floats
-    """Mean error of the joints in the image as a share of the stature; NaN if not detected."""
+    """Mean image error of the joints, as a fraction of the stature; NaN without a detection."""
     distance_m: Floats
     """Distance from the camera to the centre of the body [m]."""
     angle_deg: Floats
     """Horizontal angle between the body's heading and the direction to the camera [deg].
 
-    It is 0 for a camera in front of the body and 180 for one behind it.
+    The angle is 0 for a camera in front of the body and 180 for one behind it.
     """
 
 
 class Looker:
-    """A detector and a renderer for the crops of one scene."""
+    """Renderer and detector for the crops of one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.body = scene, load_body(scene.bodies[0])
@@ -81,7 +86,7 @@ class Looker:
         self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
-        """Detect the worker in every camera at a moment."""
+        """Detect the worker in all cameras at a moment."""
         scene = self.scene
         joints = worker_truth(self.body, now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
@@ -107,14 +112,14 @@ class Looker:
         self.renderer.close()
 
     def _found(self, now: Instant, true_px: Points2, depth_m: Floats) -> Points2:
-        """Return the detections (C, J, 2) in pinhole pixels; NaN if the worker is not found."""
+        """Return the detections (C, J, 2) in pinhole pixels; NaN if the worker is not detected."""
         cameras = self.scene.cameras
         views = zip(true_px, depth_m, cameras, strict=True)
         windows = [window_from_joints(*view) for view in views]
         if not any(windows):
             return np.full_like(true_px, np.nan)
         self.renderer.pose(now.q, one(now.motion, 0))
-        self.detector.forget(0)  # as without a track: the detector stage must agree
+        self.detector.forget(0)  # without a track, the detector stage must confirm
         px = self.detector.detect(self.source, windows).px
         return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])
 
@@ -124,8 +129,8 @@ def instants(
 ) -> Iterator[Instant]:
     """Yield n moments of a worker at work in a scene.
 
-    The desired activities alternate; one that does not occur within some minutes is replaced by the
-    current one. The worker has the first body of the scene.
+    The activities in `wanted` alternate. If one does not occur within some minutes, the moment
+    shows the current activity instead. The worker has the first body of the scene.
     """
     body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)

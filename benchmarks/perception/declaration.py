@@ -15,15 +15,15 @@ FAULTS = {
 POSTURES = {each: (each,) for each in ("stand", "walk", "carry", "work", "fold", "all")}
 SHOWN = ("none", "wrong_rotation", "wrong_translation", "wrong_focal", "knocked", "noise",
          "exposure")  # fmt: skip
-"""Faults for which the documentation shows how often cameras are reported as miscalibrated."""
+"""Faults for which the documentation shows the rate of reports of miscalibrated cameras."""
 
 
 def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Column]:
-    """Return columns of the error of estimates and of their reported standard deviations.
+    """Return the columns for errors of estimates and their reported standard deviations.
 
     Args:
-        start: prefix of the metrics.
-        words: prefix of the headings.
+        start: prefix of the metrics' names.
+        words: prefix of the columns' headings.
         key: pattern of the row in the names of metrics.
     """
     return {
@@ -36,7 +36,7 @@ def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Colum
 
 
 def make_fault_columns(level: str) -> dict[str, Column]:
-    """Return the columns on faults at a perception level."""
+    """Return the columns for faults at a perception level."""
     start, words = LEVELS[level], f"`{level}`: "
     return {
         "ratio": Column(f"{start}error_ratio.{{}}", f"{words}ratio", 2),
@@ -46,7 +46,7 @@ def make_fault_columns(level: str) -> dict[str, Column]:
 
 
 def make_name_columns(level: str) -> tuple[Column, ...]:
-    """Return the columns on reports of miscalibrated cameras at a perception level."""
+    """Return the columns for reports of miscalibrated cameras at a perception level."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
         Column(f"{key}named", f"{words}reported", shows="count"),
@@ -156,4 +156,4 @@ SPEED = Table(
     note="Median of 200 steps. The network alone: four crops on two threads, without rendering.",
 )
 TABLES = (SPEED, ACCURACY, COST, NAMED, APPEARANCE, EMULATOR, LASTING)
-"""Tables of the documentation."""
+"""Tables of the benchmark in the documentation."""

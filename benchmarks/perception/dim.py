@@ -1,9 +1,9 @@
-"""Accuracy of the pose network on dark images and images of low contrast.
+"""Accuracy of the pose network on images that are dark or have low contrast.
 
     python -m benchmarks.perception.dim
 
-The same moments are rendered in normal light and with each of `PICTURES`, and the worker is
-detected in every camera without a previous track. The standard deviations in
+The same moments are rendered in normal light and with each degradation in `PICTURES`, and the
+worker is detected in all cameras without a previous track. The standard deviations in
 `hrc_env.perception.exposure` were fitted to this table.
 """
 
@@ -32,16 +32,16 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
 GROSS = 8.0
-"""Limit to which errors in standard deviations are clipped, to reduce single gross errors."""
+"""Maximum error in standard deviations; clipping reduces the influence of gross errors."""
 
 
 class Picture(NamedTuple):
-    """A degradation of images."""
+    """A degradation of images by lower light or contrast."""
 
     light: float = 1.0
-    """Light, as in `AppearanceConfig`."""
+    """Factor on the light, as in `AppearanceConfig`."""
     darkness: float = 1.0
-    """Amount of the fault `darkness`."""
+    """Amount of the camera fault `darkness`."""
     contrast: float = 1.0
     """Factor on the difference of pixels from middle grey."""
 
@@ -56,24 +56,24 @@ PICTURES: dict[str, Picture] = {
 
 @dataclass(frozen=True, slots=True)
 class Arguments:
-    """Settings of the measurement."""
+    """Settings of the measurement on degraded images."""
 
     moments: int = 40
-    """Number of moments of each body in each scene."""
+    """Number of moments for each body in each scene."""
     bodies: tuple[str, ...] = ("worker_1", "worker_3")
     scenes: tuple[str, ...] = ("lab", "site")
     seed: int = 1
 
 
 class _Seen(NamedTuple):
-    """The detection in one crop."""
+    """Errors of the detection in one crop."""
 
-    error_px: Floats  # (J,) of each joint; NaN if not detected
-    sigma_px: Floats  # (J,) as reported
+    error_px: Floats  # (J,), NaN without a detection
+    sigma_px: Floats  # (J,), as reported by the detector
 
 
 class _Spoilt:
-    """An image source with degraded images."""
+    """An image source that degrades the images of another one."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
@@ -81,7 +81,7 @@ class _Spoilt:
         self.picture, self.count = Picture(), 0
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's degraded image."""
+        """Return a crop of a camera's degraded image."""
         image, kind = self.source.crop(camera_index, window), self.picture
         self.count += 1
         if kind.contrast < 1.0:
@@ -92,7 +92,7 @@ class _Spoilt:
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
-        """Set the moment of the following crops, and their degradation."""
+        """Set the moment and the degradation of the following crops."""
         light = AppearanceConfig(light=(picture.light, picture.light))
         self.picture = picture
         self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
@@ -100,7 +100,7 @@ class _Spoilt:
 
 
 def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
-    """Return crops of the same moments and cameras, by the names of `PICTURES`."""
+    """Return the detections at the same moments and in the same cameras, by name in `PICTURES`."""
     scene = build(SceneConfig(), name, 1, body)
     spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
     seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
@@ -129,20 +129,22 @@ def _compare(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
 
 
 class Row(NamedTuple):
-    """Comparison of degraded images with those in normal light."""
+    """Comparison of detections in degraded images and in normal light."""
 
     n_known: int
     """Number of crops with a detection in normal light."""
     n_both: int
-    """Number of these crops that also have a detection if degraded."""
+    """Number of these crops with a detection also in the degraded image."""
     error: float
-    """Ratio of the median error in the latter crops to that in normal light."""
+    """Ratio of the median error in the degraded crops to that in normal light."""
     spread: float
-    """Ratio of the root mean square of error / standard deviation to that in normal light."""
+    """Ratio of the root mean square of the normalized error in the degraded crops to that in normal
+    light.
+    """
 
 
 def make_row(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> Row:
-    """Compare degraded images with those in normal light."""
+    """Compare the detections in degraded images with those in normal light."""
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 

@@ -1,7 +1,7 @@
-"""Episodes of the environment, with errors of the estimated joints in every step.
+"""Episodes of the environment, with the errors of the estimated joints in each step.
 
-The arm rests, which makes the motion of the worker depend on the seed only: faults and perception
-levels are compared on the same motion.
+The arm is at rest, so that the motion of the worker depends on the seed only. Faults and perception
+levels are therefore compared on the same motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,18 +25,19 @@ class Episode:
     """An episode of T steps with one worker, excluding the reset."""
 
     error_m: Floats
-    """Errors of the estimate (T, J) [m]; NaN if the worker was not tracked."""
+    """Position errors of the estimated joints (T, J) [m]; NaN if the worker is not tracked."""
     std_m: Floats
-    """Square root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
-    tracked."""
+    """Square root of the trace of the reported covariance (T, J) [m]; NaN if the worker is not
+    tracked.
+    """
     inside95: Ints
-    """Number of joints within the reported 95 % region (T,)."""
+    """Number of joints (T,) with the true position within the reported 95 % region."""
     off_px: Floats
-    """Mean error of a camera's keypoints (T, C) [px]; NaN without a detection."""
+    """Mean error (T, C) of the keypoints of each camera [px]; NaN without a detection."""
     family: Ints
-    """Family of the worker's activity (T,), as an index in `views.FAMILIES`."""
+    """Index (T,) in `views.FAMILIES` of the family of the worker's activity."""
     named: Bools
-    """Mask (T, C) of cameras that were reported as miscalibrated."""
+    """Mask (T, C) of cameras that are reported as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
         """Return lists of numbers for JSON, rounded to four decimals.
@@ -48,13 +49,13 @@ class Episode:
 
 
 def read_episode(content: dict[str, Any]) -> Episode:
-    """Return an episode from the content of `Episode.to_json`."""
+    """Create an episode from the result of `Episode.to_json`."""
     arrays = {name: np.array(values, float) for name, values in content.items()}
     return Episode(**{**arrays, "named": arrays["named"] > 0})
 
 
 def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
-    """Return an episode reduced to some of its steps."""
+    """Return an episode that contains only the selected steps."""
     names = [each.name for each in fields(Episode)]
     return Episode(*(getattr(episode, name)[steps] for name in names))
 
@@ -62,9 +63,9 @@ def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """Play one episode per seed in an environment with the given arguments.
+    """Simulate one episode per seed in an environment with the given keyword arguments.
 
-    The arm rests.
+    The arm is at rest.
     """
     env = HRCEnv(n_workers=1, **arguments)
     try:
@@ -101,7 +102,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
 
 
 def _measure_error_px(env: HRCEnv, joints_world: Floats) -> Floats:
-    """Return the mean error (C,) of this step's keypoints [px]; NaN without a detection."""
+    """Return the mean error (C,) of the current step's keypoints [px]; NaN without a detection."""
     keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras
     if keypoints is None:

@@ -1,4 +1,4 @@
-"""Computation of the perception benchmark's metrics from its parts."""
+"""Computation of the metrics of the perception benchmark from the results of its parts."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,16 +24,16 @@ PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
 N_DRAWS = 200
 Metrics = dict[str, Metric]
 Found = Mapping[str, dict[str, Any]]
-"""Finished parts by label, as in `bench.Parts`."""
+"""Results of completed parts by label, as in `bench.Parts`."""
 
 
 def compute_metrics(found: Found, n_faults: int, fault_steps: int) -> Metrics:
-    """Return all metrics by name.
+    """Compute all metrics of the benchmark, by name.
 
     Args:
-        found: finished parts.
-        n_faults: number of first episodes in the lab with which faults are compared.
-        fault_steps: number of steps to which these episodes are cut.
+        found: results of the completed parts.
+        n_faults: number of first episodes in the lab that serve as the baseline for faults.
+        fault_steps: number of first steps of these episodes that are used.
     """
     played = {
         label: [read_episode(each) for each in part["episodes"]]
@@ -84,7 +84,7 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
 
 
 def _belief(name: str, episodes: list[Episode]) -> Metrics:
-    """Compute error, coverage, reported standard deviation and lost steps of episodes."""
+    """Compute error, coverage, reported standard deviation and untracked steps of episodes."""
     errors = [_select_tracked(episode.error_m) for episode in episodes]
     squared = [float((each**2).sum()) for each in errors]
     reported = [float((_select_tracked(episode.std_m) ** 2).sum()) for episode in episodes]
@@ -103,7 +103,7 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
 
 
 def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
-    """Compute metrics of faults relative to the same seeds without faults.
+    """Compute the metrics of faults, relative to the same seeds without faults.
 
     The faulty camera alternates between episodes.
     """
@@ -124,9 +124,9 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
 
 
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
-    """Compute the median error relative to that of the same seeds without the fault.
+    """Compute the ratio of the median error to that of the same seeds without the fault.
 
-    The interval is a bootstrap over seeds.
+    The confidence interval is computed by bootstrap over seeds.
     """
     above, below = ([_select_tracked(each.error_m) for each in some] for some in (episodes, base))
 
@@ -143,14 +143,14 @@ def _median(values: list[Floats], which: Ints) -> float:
 
 
 def _rate_detections(episodes: list[Episode], cameras: list[int]) -> Metric:
-    """Compute the share of steps in which the faulty camera detected the worker."""
+    """Compute the fraction of steps in which the faulty camera detects the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
     return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
 def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
-    """Compute share and delay of reports of the faulty camera, and the share of other reports."""
+    """Compute rate and delay of reports of the faulty camera, and the rate of false reports."""
     cameras = [np.arange(each.named.shape[1]) for each in episodes]
     mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
     wrong = [
@@ -180,5 +180,5 @@ def _views(every: list[View]) -> Metrics:
 
 
 def _select_tracked(values: np.ndarray) -> np.ndarray:
-    """Return the values of single joints while the worker was tracked."""
+    """Return the values of all joints in steps in which the worker is tracked."""
     return values[np.isfinite(values)]

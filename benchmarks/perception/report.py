@@ -47,13 +47,13 @@ emulator's calibration has not seen, by family of motions (`assets.emulator`).""
 
 
 def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
-    """Return the report.
+    """Return the report, with its tables and figures.
 
     Args:
-        config: settings of the benchmark, which are not used.
-        found: parts of the benchmark, which are not used.
+        config: settings of the benchmark (unused).
+        found: parts of the benchmark (unused).
         metrics: metrics by name.
-        figures: folder of figures, which is not used.
+        figures: folder of figures (unused).
     """
     del config, found, figures
     kinds = {kind: words for kind, (words,) in FAULTS.items()}

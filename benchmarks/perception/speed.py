@@ -1,4 +1,4 @@
-"""Steps per second at level `pixels` with every camera in every step, and times of the stages."""
+"""Steps per second at level `pixels` with all cameras in each step, and times of the stages."""
 
 import time
 import warnings
@@ -25,16 +25,16 @@ STAGES: Mapping[str, Sequence[Place]] = {
     "physics": ((Physics, "step"),),
     "motion": ((generator, "advance"), (generator, "watch")),
 }
-"""Functions of each stage, which are timed on the thread that steps.
+"""Functions of each stage, which are timed in the thread that steps the environment.
 
-`detect` is detection without rendering, mostly the network and waiting for it; `track` includes
-association.
+The stage `detect` is detection without rendering; it mainly consists of waiting for the network.
+The stage `track` includes association.
 """
 REST = "rest"
 WARM_UP = 10
-"""Number of steps before the measurement."""
+"""Number of warm-up steps before the measurement."""
 ROUNDS = 60
-"""Number of runs with four crops for timing the network alone."""
+"""Number of repetitions, with four crops each, for timing the network alone."""
 LITERT, OPENVINO = "litert", "openvino"
 
 
@@ -48,14 +48,17 @@ class Setting(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name in metrics, with numbers of cameras and workers and deviations from the default."""
+        """Name in metrics: numbers of cameras and workers, and scene or runtime unless default."""
         usual = {"lab", LITERT}
         special = (each for each in (self.scene, self.runtime) if each not in usual)
         return ".".join([str(self.cameras), str(self.workers), *special])
 
 
 def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
-    """Measure the median time of four crops on two threads, a lower bound for a step."""
+    """Measure the median time of the network for four crops on two threads [ms].
+
+    The result "ms" is a lower bound on the time of a step.
+    """
     landmarkers = [load_landmarker(runtime=runtime) for _ in range(2)]
     crop = np.random.default_rng(0).random((LANDMARK_SIDE, LANDMARK_SIDE, 3), np.float32)
     seconds = []
@@ -74,13 +77,13 @@ def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
 def measure(
     setting: Setting, n_steps: int, seed: int, tick: Callable[[float], None]
 ) -> dict[str, Any]:
-    """Measure the speed with random actions, and the times of the stages.
+    """Measure the speed of an environment with random actions, and the times of its stages.
 
-    The result has "steps_per_s" of the median of "n" steps, and in "stages" milliseconds per step
-    from as many further steps, in which the stages are timed.
+    The result contains "steps_per_s", from the median time of "n" steps, and "stages", the time of
+    each stage per step [ms], from the same number of further steps.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # on the small number of cameras
+        warnings.simplefilter("ignore")  # warning about few cameras
         env = HRCEnv(
             scene=setting.scene,
             cameras=list(range(setting.cameras)),
@@ -109,7 +112,7 @@ def measure(
 
 
 def _step(env: HRCEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
-    """Take random actions, and return the duration of each step [s]."""
+    """Take random actions and return the duration of each step [s]."""
     seconds = []
     for _ in range(n_steps):
         action = actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Grouping of crops into rows of tables, by activity, distance, view angle and so on."""
+"""Grouping of crops into table rows, by scene, body, activity, distance, view angle and so on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,33 +13,35 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "raise": ("drill overhead", "climb"),
     "fold": ("lift", "pick up", "set down", "squat", "kneel", "fall"),
 }
-"""Families of motions with their activities; every activity is in exactly one.
+"""Families of motions with their activities; each activity belongs to exactly one family.
 
-The assignment is a judgement; in `fold`, trunk or knees are bent far, for which the network is
-weak.
+The assignment was made by hand. In the family `fold`, trunk or knees are strongly flexed; the
+accuracy of the network is lower for such poses.
 """
 FAMILY_OF: dict[str, str] = {
     activity: family for family, activities in FAMILIES.items() for activity in activities
 }
 DISTANCES_M = (0, 3, 4, 6, 9, 13)
-"""Lower bounds of the rows by distance [m]; the last one is open."""
+"""Lower bounds of the rows by distance [m]; the last row has no upper bound."""
 ANGLES_DEG = (0, 45, 90, 135)
-"""Lower bounds of the rows by view angle [deg]; each is 45 degrees wide."""
+"""Lower bounds of the rows by view angle [deg]; each row covers 45 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One crop with the whole worker in view, and the result of its detection."""
+    """A crop with the whole worker in view, and the error of the detection in it."""
 
     variant: str
-    """Conditions of the crop, `PLAIN` or "<kind> <row>"."""
+    """Variant of the scene: `PLAIN`, or "<kind> <row>" of the table."""
     scene: str
     body: str
     activity: str
     distance_m: float
     angle_deg: float
     error: float | None
-    """Mean error of the joints in the image as a share of the stature; None if not detected."""
+    """Mean error of the joints in the image, as a fraction of the stature; None without a
+    detection.
+    """
 
 
 ROWS: Mapping[str, Callable[[View], str]] = {
@@ -51,11 +53,13 @@ ROWS: Mapping[str, Callable[[View], str]] = {
     "lens": lambda view: view.variant.removeprefix("lens "),
     "appearance": lambda view: view.variant.removeprefix("appearance "),
 }
-"""Kinds of rows, each a function from a crop to its row."""
+"""Functions that return the table row of a crop, by kind of rows."""
 COMPARED = ("lens", "appearance")
-"""Kinds that compare variants "<kind> <row>" of the same moments; the others use `PLAIN`."""
+"""Kinds of rows that compare variants "<kind> <row>" at the same moments; the other kinds use
+`PLAIN` crops.
+"""
 PLAIN = "plain"
-"""Variant of crops in unchanged scenes."""
+"""Name of the variant with unchanged scenes."""
 
 
 def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
@@ -68,7 +72,7 @@ def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
 
 
 def list_activities() -> tuple[str, ...]:
-    """Return every activity that a worker does on its own, in an order that alternates families."""
+    """Return all activities except "clip", in an order that alternates families."""
     kinds = [[each for each in names if each != "clip"] for names in FAMILIES.values()]
     longest = max(map(len, kinds))
     return tuple(names[k] for k in range(longest) for names in kinds if k < len(names))
@@ -88,6 +92,6 @@ def _band(value: float, bounds: tuple[float, ...], unit: str) -> str:
 
 
 def _order(row: str) -> tuple[float, str]:
-    """Return the sort key of a row: bands by their numbers, names alphabetically."""
+    """Return the sort key of a row, which orders bands by number and names alphabetically."""
     number = row.split("_", 1)[0]
     return (float(number) if number.replace(".", "").isdigit() else -1.0, row)

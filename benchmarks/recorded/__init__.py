@@ -1,1 +1,1 @@
-"""Evaluation of estimators on recorded films, for which there is no ground truth."""
+"""Evaluation of estimators on recorded videos without ground truth."""

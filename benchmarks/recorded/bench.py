@@ -1,4 +1,4 @@
-"""The tracking benchmark on recorded films, with the same detections for every estimator."""
+"""The tracking benchmark on recorded videos, with the same detections for all estimators."""
 
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
 _DETECTING = 0.5
-"""Share of the progress that detection takes."""
+"""Fraction of the total progress that is assigned to detection."""
 _LEAD = """\
 Leave-one-camera-out reprojection [px]; best of both sides: where it fits better, left and right of
 the held-out detections are exchanged. Coverage: share of held-out detections within the 95 % region
@@ -58,7 +58,7 @@ FOOTAGE = Table(
 
 @dataclass(frozen=True, slots=True)
 class RecordedBench:
-    """The experiment, which has no settings."""
+    """Benchmark of the estimators on a recorded sequence. It has no configurable settings."""
 
     name = "bench recorded"
     depends = ("tracker", "detector")
@@ -66,14 +66,16 @@ class RecordedBench:
     n_parts = 1
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return {"recording": POSE2SIM.requirement, "follower": FOLLOWER}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Fetch the recording, detect the person or use cached detections, and run all estimators.
+        """Run all estimators on the detections of the person, which are computed or from the cache.
+
+        The recording is downloaded if it is missing.
 
         Raises:
-            DownloadError: the recording is missing and cannot be fetched.
+            DownloadError: the recording is missing and cannot be downloaded.
             WeightsError: the weights of the pose network are missing.
         """
         recording = fetch_recording(lambda sentence: cache.progress(0.0, sentence))
@@ -89,22 +91,22 @@ class RecordedBench:
         return dict(sorted(metrics.items()))
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the table of the documentation."""
+        """Return the table that this benchmark fills in the documentation."""
         return (FOOTAGE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics)
 
 
 def _of_estimator(
     name: str, P: Floats, config: TrackerConfig, detections: Detections
 ) -> dict[str, Metric]:
-    """Return the metrics of one estimator."""
+    """Compute the metrics of one estimator."""
     metrics = {}
     for kind, metric in summarize_foretold(foretell(name, P, config, detections)).items():
         measure, *part = kind.split(".")

@@ -1,11 +1,12 @@
-"""Reading of a Qualisys calibration (XML) as pinhole cameras with lenses.
+"""Conversion of a Qualisys calibration (XML) to pinhole cameras with lens distortion.
 
 Frames: the world frame of the file is right-handed with +Z up, in millimetres; it becomes `world`
-in metres. The rows of its matrix are the axes of the camera (+X right, +Y up, -Z forward), which
-become those of OpenCV (+X right, +Y down, +Z forward) by a half turn about +X. Lengths in the image
-are in 64ths of a pixel from the centre of the first pixel; here, pixels are counted from the corner
-of the image, which adds half a pixel. If an image is narrower than in the calibration, its right
-margin was cut off: shifting or stretching the image makes the views agree less.
+in metres. The rows of a camera's matrix in the file are its axes (+X right, +Y up, -Z forward). A
+half turn about +X converts them to the axes of OpenCV (+X right, +Y down, +Z forward). Image
+coordinates in the file are in 64ths of a pixel, measured from the centre of the first pixel; here
+they are in pixels, measured from the corner of the image, which adds half a pixel. An image that is
+narrower than in the calibration is assumed to be cropped at the right, since shifting or scaling
+the image makes the views less consistent.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -23,13 +24,13 @@ _HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
 def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[PinholeCamera]:
-    """Read the cameras of a Qualisys calibration file, for films of given widths and heights."""
+    """Read the cameras of a Qualisys calibration file, for videos of given widths and heights."""
     found = ElementTree.parse(path).getroot().iter("camera")
     return [_camera(camera, size) for camera, size in zip(found, sizes_px, strict=True)]
 
 
 def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
-    """Return the point (3,) that is closest to all optical axes, which are not parallel [m]."""
+    """Return the point (3,) closest to all optical axes, which must not be parallel [m]."""
     normal, rhs = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:
         along = camera.T_world_from_cam[:3, 2]
@@ -40,11 +41,11 @@ def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
 
 
 def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
-    """Return tracker settings for a rig, with a prior around the point that its cameras look at.
+    """Return tracker settings for a rig, with a prior around the point at which its cameras aim.
 
-    This point is the closest to all optical axes. The standard deviation of the prior is half the
-    mean distance of the cameras from it. There is no floor, since the file does not have its
-    height.
+    This point is the one closest to all optical axes. The standard deviation of the prior is half
+    the mean distance of the cameras from the point. The settings have no floor, since the file does
+    not contain its height.
     """
     point = find_meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]

@@ -1,4 +1,4 @@
-"""Detections of the pose network in a recording, which are cached and used by every estimator."""
+"""Detections of the pose network in a recording, which are cached for all estimators."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -17,7 +17,9 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 
 FOLLOWER = "kalman"
-"""Estimator that predicts the crop windows; the default would get an advantage from this."""
+"""Name of the estimator that predicts the crop windows. It is not the default estimator, which
+would gain an advantage.
+"""
 SURE = 0.5
 """Minimum confidence of detections that are evaluated."""
 
@@ -36,7 +38,7 @@ class Detections:
     """Time between frames [s]."""
 
     def keypoints(self, t: int, cameras: list[int]) -> Keypoints:
-        """Return the keypoints of frame `t` in some of the cameras."""
+        """Return the keypoints of frame `t` in the given cameras."""
         px, confidence, sigma = (
             array[t, cameras][None, :, None] for array in (self.px, self.confidence, self.sigma_px)
         )
@@ -44,7 +46,7 @@ class Detections:
 
 
 def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
-    """Return the detections in all films, computed or from the cache."""
+    """Return the detections in all videos, computed or from the cache."""
 
     def make(tick: PartProgress) -> dict[str, Any]:
         found = asdict(_detect(films, cameras, tick))
@@ -56,10 +58,10 @@ def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache
 
 
 def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> Detections:
-    """Detect the person near the predicted position in every frame; search if there is no track.
+    """Detect the person near the predicted pose in each frame; without a track, search the images.
 
-    An estimator that uses all cameras predicts the windows. A bystander is not detected, since the
-    search prefers hips at which the lines of sight of most cameras meet.
+    An estimator that uses all cameras predicts the crop windows. The bystander is not detected,
+    since the search prefers hips at which the lines of sight of most cameras meet.
     """
     pinholes = [replace(camera, lens=None) for camera in cameras]
     dt_s = 1 / films.frames_per_s
@@ -87,7 +89,7 @@ def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> D
 
 
 def _windows(predicted: PoseEstimate, cameras: list[PinholeCamera]) -> list[Roi | None]:
-    """Return a window per camera around the predicted joints, or None if there is no track."""
+    """Return one crop window per camera around the predicted joints, or None without a track."""
     if not predicted.tracked[0, 0]:
         return [None] * len(cameras)
     px, depth_m = project(projections(tuple(cameras)), predicted.mean_world[:, 0])

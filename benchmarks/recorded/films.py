@@ -1,4 +1,4 @@
-"""Recorded films as an image source, which has one frame of every camera at a time."""
+"""Recorded videos as an image source that provides one frame of each camera at a time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,10 +13,10 @@ from hrc_env.perception.blazepose import crop_window
 
 
 class Films:
-    """An `ImageSource` of the current frames of a rig's films, which are read together."""
+    """An `ImageSource` with the current frames of the videos of a rig, which are read in step."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        """Open the films; raise `ConfigError` if a file is not a film."""
+        """Open the videos; raise `ConfigError` if a file is not a video."""
         self.frames: list[Image] = []
         """Current frame of each camera, (H, W, 3) RGB; the list is empty before `advance`."""
         self._films = [cv2.VideoCapture(str(path)) for path in paths]
@@ -26,7 +26,7 @@ class Films:
 
     @property
     def frames_per_s(self) -> float:
-        """Frame rate of the first film [Hz]."""
+        """Frame rate of the first video [Hz]."""
         return float(self._films[0].get(cv2.CAP_PROP_FPS))
 
     @property
@@ -39,11 +39,11 @@ class Films:
 
     @property
     def n_frames(self) -> int:
-        """Number of frames of the shortest film, according to the headers."""
+        """Number of frames of the shortest video, according to the file headers."""
         return min(int(film.get(cv2.CAP_PROP_FRAME_COUNT)) for film in self._films)
 
     def advance(self) -> bool:
-        """Read the next frames; return False at the end of a film."""
+        """Read the next frame of each video; return False at the end of a video."""
         read = [film.read() for film in self._films]
         if not all(ok for ok, _ in read):
             return False
@@ -53,10 +53,10 @@ class Films:
         return True
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return an upright window of a camera's current frame, (256, 256, 3) RGB."""
+        """Return an upright crop of a camera's current frame, (256, 256, 3) RGB."""
         return crop_window(self.frames[camera_index], window)
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the video files."""
         for film in self._films:
             film.release()

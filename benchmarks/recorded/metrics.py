@@ -1,7 +1,7 @@
-"""Metrics of an estimator on recorded films, without ground truth.
+"""Metrics of an estimator on recorded videos, without ground truth.
 
-They are the error of predicted detections in a held-out camera, the variation of bone lengths, and
-the jerk of the motion.
+The metrics are the error of predicted detections in a held-out camera, the variation of bone
+lengths, and the jerk of the motion.
 """
 
 from dataclasses import dataclass, fields
@@ -44,7 +44,7 @@ class Track:
 def follow(
     name: str, P: Floats, config: TrackerConfig, detections: Detections, cameras: list[int]
 ) -> Track:
-    """Run an estimator, or the smoother, with some of the cameras of a recording."""
+    """Run an estimator or the smoother with the given cameras of a recording."""
     clip = [detections.keypoints(t, cameras) for t in range(len(detections.px))]
     if name == SMOOTHER:
         belief = smooth(P[cameras], clip, detections.dt_s, config)
@@ -65,19 +65,24 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foretold:
-    """Errors of predicted detections in held-out cameras, computed from the other cameras."""
+    """Errors in held-out cameras of the detections that are predicted from the other cameras."""
 
     off_px: Floats
-    """Distance from detections (T, C, J) [px]; NaN for low confidence, or without a track."""
+    """Distance between predictions and detections (T, C, J) [px]; NaN if the confidence is low or
+    there is no track.
+    """
     off_either_px: Floats
-    """The same distances; left and right of a detection are swapped in frames in which this fits
-    better."""
+    """The same distances, with left and right of the detection swapped in frames in which this
+    reduces the error [px].
+    """
     inside: Floats
-    """1 for detections in the joint 95 % region of estimate and detector (T, C, J), otherwise 0."""
+    """Indicator (T, C, J), 1 for detections within the combined 95 % region of estimate and
+    detector, otherwise 0.
+    """
 
 
 def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections) -> Foretold:
-    """Predict the detections in each camera from those in the others."""
+    """Predict the detections in each camera from those in the other cameras."""
     n_frames, n_cameras, n_joints = detections.confidence.shape
     off = np.full((3, n_frames, n_cameras, n_joints), np.nan)
     for held in range(n_cameras):
@@ -97,7 +102,7 @@ def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections
 
 
 def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Bools:
-    """Return a mask (T, J) of detections in the joint 95 % region of estimate and detector."""
+    """Return a mask (T, J) of detections in the combined 95 % region of estimate and detector."""
     points = np.concatenate([track.mean_world, np.ones((*track.mean_world.shape[:-1], 1))], -1)
     u, v, w = np.moveaxis(points @ P.T, -1, 0)
     px = np.stack([u / w, v / w], -1)
@@ -110,9 +115,9 @@ def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Boo
 
 
 def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
-    """Compute median and 95th percentile [px], without and with swapped sides, and coverage.
+    """Compute median and 95th percentile of errors [px], without and with swaps, and coverage.
 
-    Intervals are by bootstrap over blocks of frames.
+    Confidence intervals are computed by bootstrap over blocks of frames.
     """
     n_blocks = max(len(foretold.inside) // _BLOCK, 1)
     out = {
@@ -129,7 +134,7 @@ def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
 def bone_std(track: Track) -> Metric:
     """Compute the standard deviation of bone lengths over time [m].
 
-    The metric is the mean over bones, with the minimum and the maximum.
+    The value of the metric is the mean over bones; its interval is the range over bones.
     """
     joints = track.mean_world[track.tracked]
     lengths = np.linalg.norm(joints[:, BONES[:, 0]] - joints[:, BONES[:, 1]], axis=-1)
@@ -139,7 +144,7 @@ def bone_std(track: Track) -> Metric:
 def jerk(track: Track, dt_s: float) -> Metric:
     """Compute the root mean square of the jerk of joint positions [m/s^3].
 
-    The metric is that of all joints, with the minimum and the maximum over joints.
+    The value of the metric includes all joints; its interval is the range over joints.
     """
     squared = (np.diff(track.mean_world[track.tracked], 3, axis=0) ** 2).sum(-1) / dt_s**6
     return _over(np.sqrt(squared.mean(0)), float(np.sqrt(squared.mean())), "m/s^3")

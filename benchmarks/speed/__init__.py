@@ -1,1 +1,1 @@
-"""The speed benchmark: steps per second of whole environments, and times of their parts."""
+"""The speed benchmark: steps per second of whole environments, and times of the parts of a step."""

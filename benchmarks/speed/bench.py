@@ -1,7 +1,8 @@
-"""The speed benchmark, in which all contenders take turns to be equally affected by noise.
+"""The speed benchmark, which interleaves all contenders so that noise affects them equally.
 
-A round runs every contender for whole episodes, those at level `keypoints` a second time with timed
-parts, and resets. Then every id has its turns. Results are medians over rounds.
+In each round, every contender runs for whole episodes; contenders at level `keypoints` run a second
+time with timed parts. Resets are measured at the end of a round. Then the speed of each id is
+measured in the same way. Results are medians over rounds.
 """
 
 import math
@@ -35,50 +36,54 @@ from hrc_env.safety.shield import find_shield
 from hrc_env.tasks.task import find_task
 
 EVERY = "every"
-"""Word that stands for all ids."""
+"""Value of `task` that selects all ids."""
 WATCHED = "keypoints"
-"""Level at which the parts of a step are timed."""
+"""Perception level at which the parts of a step are timed."""
 _REACHERS = 64
-"""Number of environments in the vector of Reachers."""
+"""Number of environments in the vector environment of Reacher."""
 _MAKING = 0.1
-"""Share of the progress that the creation of environments takes."""
+"""Fraction of the total progress that is assigned to the creation of environments."""
 
 
 Measured = defaultdict[str, list[float]]
-"""One number per round, by "<kind>.<name>".
+"""Measured numbers, one per round, by "<kind>.<name>".
 
 Configurations in names are "single" and "<num_envs>.<threads>".
 """
 BY_TASK = "task_steps_per_s"
-"""Kind of the numbers that are measured for every id."""
+"""Kind of the numbers that are measured for each id."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedBench:
-    """The experiment, and its amount of data."""
+    """Benchmark of the speed of environments."""
 
     name = "bench speed"
     depends = ("env", "tracker", "emulator", "motion")
     seeds = (0,)
     n_parts = 1
     task: str = OURS
-    """Id of the environment, or "every" for only the speed of each id."""
+    """Id of the environment, or "every" to measure only the speed of each id."""
     shield: str | None = None
-    """Name of the shield, or None."""
+    """Name of the shield of the environments, or None."""
     n_rounds: int = 6
     """Number of rounds."""
     least_steps: int = 4000
-    """Minimum number of environment steps in a turn, which is rounded up to whole episodes."""
+    """Minimum number of environment steps in a turn; it is rounded up to whole episodes."""
     n_resets: int = 25
     """Number of resets of each kind per round."""
     task_steps: int = 200
-    """Steps of each id's vector per round, for the default `task` and for "every"."""
+    """Number of steps per round of each id's vector environment, if `task` is the default or
+    "every".
+    """
     levels: tuple[str, ...] = (WATCHED, "truth", "none")
-    """Perception levels."""
+    """Perception levels of the environments."""
     sizes: tuple[int, ...] = (1, 16, 64, 256)
-    """Numbers of environments in vectors."""
+    """Numbers of environments in a vector environment."""
     threads: tuple[int, ...] = (1, 2)
-    """Numbers of threads of vectors; those above the number of environments are left out."""
+    """Numbers of threads of a vector environment; numbers above that of its environments are
+    skipped.
+    """
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a value is invalid."""
@@ -91,21 +96,21 @@ class SpeedBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
         return (
             describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
         )
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Measured:
-        """Measure all rounds; nothing is stored between runs.
+        """Measure all rounds; no results are cached.
 
         Raises:
-            HRCError: a timed function is no longer called, and its time would be missed.
+            HRCError: a function that should be timed is never called.
         """
         measured = Measured(list)
         if self.task != EVERY:
@@ -115,16 +120,16 @@ class SpeedBench:
         return measured
 
     def metrics(self, played: Measured) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played)
 
     @property
     def vectors(self) -> list[tuple[int, int]]:
-        """Pairs of the number of environments and the number of threads of every vector."""
+        """Pairs (number of environments, number of threads), one for each vector environment."""
         return [(n, k) for n in self.sizes for k in self.threads if k <= n]
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         configurations = (SINGLE, *(f"{size}.{threads}" for size, threads in self.vectors))
         return (make_steps_table(self.levels, configurations), make_organs_table(SHOWN), TASKS)
 
@@ -134,16 +139,16 @@ class SpeedBench:
 
 
 QUICK = SpeedBench(n_rounds=1, least_steps=1000, task_steps=25)
-"""The quick form, which computes every number from one short turn."""
+"""Benchmark settings for a quick run, which computes all numbers from one short turn."""
 
 
 UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
-"""Units of numbers by kind."""
+"""Units of the measured numbers, by kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """The turn of a contender in each round."""
+    """The measurement of a contender that is repeated in each round."""
 
     level: str
     configuration: str
@@ -151,11 +156,11 @@ class Turn:
     contender: Contender
     n_episodes: int
     cost: float
-    """Approximate duration of the turn relative to other turns."""
+    """Approximate duration of the turn, relative to other turns."""
 
 
 def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """Measure the speed of every id."""
+    """Measure the speed of the environments of all ids."""
     share = (config.task == EVERY) / config.n_rounds
     with closing(Tasks()) as tasks:
         for _ in range(config.n_rounds):
@@ -165,7 +170,7 @@ def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """Measure one id in all configurations, the parts of its steps, and resets."""
+    """Measure one id in all configurations, with the parts of its steps and its resets."""
     organs = Organs()
     with ExitStack() as exits:
         turns = [*_turns(config, exits, parts.progress)]
@@ -182,7 +187,7 @@ def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
-    """Run a contender; at level `WATCHED`, run it a second time and time its parts."""
+    """Run a contender; at level `WATCHED`, run it a second time with timed parts."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
     measured[f"env_steps_per_s.{name}"].append(pace.env_steps / pace.seconds)
@@ -193,7 +198,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 
 def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
-    """Yield the turns of all contenders, which `exits` closes at the end."""
+    """Yield the turns of all contenders; `exits` closes the contenders at the end."""
     known = config.vectors
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
@@ -217,7 +222,7 @@ def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator
 
 
 def compute_metrics(measured: Measured) -> dict[str, Metric]:
-    """Compute medians over rounds, with the minimum and the maximum."""
+    """Compute all metrics as medians over rounds, with the range over rounds as interval."""
     own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
     by_task = {
         name: measured[f"{BY_TASK}.{name}"] for name in list_endings(measured, f"{BY_TASK}.")

@@ -1,6 +1,6 @@
-"""The contenders of the speed benchmark, which use public interfaces only.
+"""The contenders of the speed benchmark, which use only public interfaces.
 
-They are single and vector environments, Gymnasium's Reacher, and resets.
+The contenders are single and vector environments, Gymnasium's Reacher, and resets.
 """
 
 import time
@@ -19,12 +19,14 @@ OURS, PEER = "HRCReach-v0", "Reacher-v5"
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """The steps and the duration of a run."""
+    """Number of steps and duration of a run."""
 
     env_steps: int
-    """Number of steps in which an action was executed, without those that only start an episode."""
+    """Number of steps in which an action is executed; steps that only reset an environment are
+    excluded.
+    """
     seconds: float
-    """Duration from the first action to the last info, including resets [s]."""
+    """Duration from the first action until the last info is read, including resets [s]."""
 
 
 class Single:
@@ -36,7 +38,7 @@ class Single:
         self.env.reset(seed=0)
 
     def run(self, n_episodes: int) -> Pace:
-        """Take random actions for whole episodes and read every info."""
+        """Take random actions for a number of whole episodes, and read all infos."""
         actions = _actions(self.env, n_episodes * self.episode_env_steps)
         started_s = time.perf_counter()
         for action in actions:
@@ -52,7 +54,7 @@ class Single:
 
 
 class Vector:
-    """An environment of `gymnasium.make_vec`; episodes restart in the step after their end."""
+    """A vector environment of `gymnasium.make_vec`, which resets in the step after an episode."""
 
     def __init__(self, id: str, num_envs: int, **arguments: Any) -> None:
         self.env: Any = gymnasium.make_vec(id, num_envs, **arguments)
@@ -62,11 +64,11 @@ class Vector:
         self._ended: Bools = np.zeros(num_envs, bool)
 
     def run(self, n_episodes: int) -> Pace:
-        """Take random actions for whole episodes and read every info."""
+        """Take random actions for a number of whole episodes, and read all infos."""
         return self.run_steps(n_episodes * (self.episode_steps + 1))
 
     def run_steps(self, n_steps: int) -> Pace:
-        """Take random actions for a number of steps of the vector, continuing its episodes."""
+        """Take random actions for a number of vector steps, which continue the current episodes."""
         actions = _actions(self.env, n_steps)
         n_starts, ended = 0, self._ended
         started_s = time.perf_counter()
@@ -87,7 +89,7 @@ SOME, MANY = 8, 64
 
 
 class Starts:
-    """Resets of a single environment, and of some in a vector of 64 on one thread."""
+    """Resets of a single environment, and of some of 64 batched environments in one thread."""
 
     def __init__(self, id: str = OURS) -> None:
         self.single = gymnasium.make(id, perception="keypoints")
@@ -96,7 +98,7 @@ class Starts:
         self.vector.reset(seed=0)
 
     def run(self, n_resets: int) -> dict[str, float]:
-        """Measure the mean time of resets of one environment, and of 8 of 64 in turn [ms]."""
+        """Measure the mean time to reset one environment, and 8 of 64 batched ones [ms]."""
         started_s = time.perf_counter()
         for _ in range(n_resets):
             self.single.reset()
@@ -115,11 +117,11 @@ class Starts:
 
 
 Contender = Single | Vector
-"""A single or vector environment, which runs a number of episodes at each call."""
+"""A single or vector environment that runs a given number of episodes."""
 
 
 def read(info: Mapping[str, Any]) -> None:
-    """Read every value of an info dictionary, as logging does."""
+    """Read all values of an info dictionary, as logging would."""
     for name in info:
         _ = info[name]
 

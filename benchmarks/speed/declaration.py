@@ -9,9 +9,9 @@ from hrc_env.tasks import BUILT_IN, DEFAULT
 
 ASKED = "How long does a step take, alone and in a batch, and which parts take the time?"
 SINGLE = "single"
-"""Configuration of an environment of `gymnasium.make`, as opposed to a vector of one."""
+"""Name of the configuration with an environment of `gymnasium.make`."""
 REACHER = "reacher"
-"""Name of Gymnasium's Reacher in place of a perception level."""
+"""Name of Gymnasium's Reacher, which is used in place of a perception level."""
 SHOWN = (SINGLE, "16.1", "64.1", "64.2")
 """Configurations for which the documentation shows the parts of a step."""
 RESETS = {

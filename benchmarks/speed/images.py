@@ -1,11 +1,11 @@
-"""Time of camera images in observations.
+"""Processor time of camera images in observations.
 
     python -m benchmarks.speed.images
 
-All contenders take turns, to be equally affected by noise of the machine: a step without images,
-with one and with all images, `render()`, and the rig rendered in the style of `render()`. Results
-are milliseconds of processor time, as medians with quartiles, and ratios to `render()` and to a
-step; `--out` writes them as JSON.
+The contenders are a step without images, with one image and with all images, a call of `render()`,
+and the images of all cameras rendered in the style of `render()`. They are measured in turn, so
+that noise of the machine affects them equally. Results are medians of processor time [ms] with
+quartiles, and ratios to `render()` and to a step; the option `--out` writes them as JSON.
 """
 
 import json
@@ -34,13 +34,13 @@ class Arguments:
     """Measure the time of camera images in observations."""
 
     rounds: int = 60
-    """Number of turns of each contender."""
+    """Number of measurements of each contender."""
     size: int = 84
     """Width and height of images [px]."""
     task: str = "HRCReach-v0"
     """Id of the environment."""
     out: Path | None = None
-    """JSON file for the results."""
+    """JSON file to which the results are written."""
 
 
 def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[], Any]]:
@@ -76,7 +76,7 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
 
 
 def measure(arguments: Arguments) -> dict[str, list[float]]:
-    """Measure the processor time of every turn, by name of the contender [ms]."""
+    """Measure the processor time of all turns, by name of the contender [ms]."""
     with ExitStack() as exits:
         turns = contenders(arguments, exits)
         took: dict[str, list[float]] = {name: [] for name in turns}
@@ -84,7 +84,7 @@ def measure(arguments: Arguments) -> dict[str, list[float]]:
             for name, turn in turns.items():
                 started_s = time.process_time()
                 turn()
-                if round_ >= 2:  # the first rounds render static objects
+                if round_ >= 2:  # the first rounds also render static objects
                     took[name].append(1e3 * (time.process_time() - started_s))
     return took
 

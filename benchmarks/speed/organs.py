@@ -1,7 +1,7 @@
-"""The functions of each part of a step, and their times.
+"""Timing of the parts of a step, each of which is a set of functions.
 
-The benchmark fails if a function has been renamed, or if no step calls it any more. This detects
-work that has moved elsewhere and would not be timed.
+The benchmark fails if a function has been renamed or is no longer called. This detects code that
+has been moved and would not be timed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
 RESET, REST, TOTAL = "reset", "rest", "total"
-"""Further rows of the table: resets, remaining time, and total."""
+"""Names of further rows of the table: resets, remaining time, and total."""
 ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
     "motion": (
@@ -49,15 +49,16 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }
-"""Functions by part of a step, at level `keypoints` with one worker.
+"""Functions of each part of a step, at level `keypoints` with one worker.
 
-The `emulator` includes lines of sight, `physics` the controller, `distances` the robot's own
-bodies, `reward` the task, and `tracking` the transport of keypoints to the estimator.
+The part `emulator` includes the test of lines of sight, `physics` the controller, `distances` those
+between bodies of the robot, `reward` the task, and `tracking` the transport of keypoints to the
+estimator.
 """
 
 
 class Organs:
-    """A timer of the parts of a step, which records functions that were never called."""
+    """A timer of the parts of a step, which also detects functions that are never called."""
 
     def __init__(self, organs: Mapping[str, Sequence[Place]] = ORGANS) -> None:
         self.organs = organs
@@ -66,10 +67,10 @@ class Organs:
     def us_per_env_step(
         self, contender: Contender, n_episodes: int, n_threads: int
     ) -> dict[str, float]:
-        """Measure microseconds per environment step of parts, resets, remaining time, and total.
+        """Measure the times per environment step of parts, resets, remainder, and total [us].
 
-        The time of a part is summed over threads and divided by their number, which is its
-        contribution to the wall-clock time.
+        The time of a part is summed over threads and divided by their number; this is the
+        contribution of the part to the wall-clock time.
         """
         watch = Stopwatch(self.organs, whole=(RESET,))
         with watch.running():
@@ -81,7 +82,7 @@ class Organs:
         return {**us, REST: total - sum(us.values()), TOTAL: total}
 
     def check_all_called(self) -> None:
-        """Raise `HRCError` if a function in the table has not been called in any run."""
+        """Raise `HRCError` if a function in `ORGANS` has not been called in any run."""
         if self._idle:
             raise HRCError(
                 "The table ORGANS contains functions that no step calls, so that their time would "

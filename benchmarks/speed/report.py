@@ -55,13 +55,13 @@ def report(metrics: Metrics, figures: Path) -> Report:
 
 
 def _size(configuration: str) -> tuple[int, str]:
-    """Return the sort key of a configuration."""
+    """Return the sort key of a configuration: number of environments, then name."""
     size, _, how = configuration.partition(".")
     return (0, "") if configuration == SINGLE else (int(size), how)
 
 
 def plot_organs(path: Path, metrics: Metrics) -> None:
-    """Plot bars of microseconds per environment step, separately for one and many environments."""
+    """Plot the times of the parts as stacked bars, with panels for one and many environments."""
     groups: tuple[list[str], list[str]] = ([], [])
     for each in list_endings(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
@@ -79,7 +79,7 @@ def plot_organs(path: Path, metrics: Metrics) -> None:
 
 
 def _bar_title(configuration: str) -> str:
-    """Return the label below a bar, in two lines for a batch."""
+    """Return the label below a bar; that of a batch has two lines."""
     words = title(configuration)
     return words if configuration == SINGLE else f"batch of {words.replace(' on ', chr(10))}"
 

@@ -1,4 +1,4 @@
-"""A stopwatch that wraps functions at run time, without changes to their code."""
+"""A stopwatch that measures functions by wrapping them at run time."""
 
 import threading
 import time
@@ -9,27 +9,27 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Place = tuple[Any, str]
-"""A module or a class, and the name of a function in it."""
+"""A module or class, and the name of one of its functions."""
 
 
 @dataclass(slots=True)
 class _Hand:
-    """The times and calls of one thread."""
+    """Times and numbers of calls in one thread."""
 
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: Counter[str] = field(default_factory=Counter)
     within: list[float] = field(default_factory=list)
-    """Time of nested timed calls in each timed call that is running [s]."""
+    """Time spent in nested timed calls, for each timed call that is running [s]."""
     closed: bool = False
-    """Whether a call of a part in `Stopwatch.whole` is running."""
+    """Whether a call of a function of a part in `Stopwatch.whole` is running."""
 
 
 class Stopwatch:
-    """Measures the exclusive time of each part, summed over all threads.
+    """A stopwatch for the exclusive time of each part, summed over all threads.
 
-    Time that a timed call spends in other timed calls counts for the latter only, which makes parts
-    add up. The time of waiting for another thread counts for the part that waits. Within the parts
-    in `whole`, no other parts are timed.
+    Time that a timed call spends in other timed calls is attributed only to the latter, so that the
+    times of the parts add up. The time of waiting for another thread is attributed to the waiting
+    part. Within the parts in `whole`, no other parts are timed.
     """
 
     def __init__(self, organs: Mapping[str, Sequence[Place]], whole: Sequence[str] = ()) -> None:
@@ -49,7 +49,7 @@ class Stopwatch:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Time the calls of all parts in the context, and restore the functions afterwards."""
+        """Time all calls of the parts within the context, and restore the functions afterwards."""
         kept: list[tuple[Any, str, Any]] = []
         try:
             for organ, places in self.organs.items():
@@ -86,7 +86,7 @@ class Stopwatch:
         return call
 
     def _hand(self) -> _Hand:
-        """Return the times and calls of this thread."""
+        """Return the times and numbers of calls of the current thread."""
         try:
             return self._own.hand
         except AttributeError:

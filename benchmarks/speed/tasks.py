@@ -1,4 +1,4 @@
-"""The speed of every id relative to the default id, with the same interface and in turns."""
+"""Speed of the environment of each id, relative to that of the default id."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,14 +7,18 @@ from hrc_env.core.results import Metric, over
 from hrc_env.tasks import BUILT_IN
 
 WARM_STEPS, THREADS, AT_ONCE = 20, 2, 20
-"""Steps before the measurement, threads of the environments of an id, and steps of one turn.
+"""Number of warm-up steps, number of threads per vector environment, and number of steps in one
+turn.
 
-Turns are short, to let noise of the machine affect all ids equally.
+Turns are short, so that noise of the machine affects all ids equally.
 """
 
 
 class Tasks:
-    """A vector of 64 environments on two threads for every id, at `keypoints` with one worker."""
+    """Vector environments of all ids, at `keypoints` with one worker.
+
+    Each consists of 64 environments in two threads.
+    """
 
     def __init__(self) -> None:
         each = {"perception": "keypoints", "num_threads": THREADS, "n_workers": 1}
@@ -23,7 +27,7 @@ class Tasks:
             vector.run_steps(WARM_STEPS)
 
     def run(self, n_steps: int) -> dict[str, float]:
-        """Measure environment steps per second by id; episodes continue between calls."""
+        """Measure the environment steps per second of each id; episodes continue between calls."""
         paces: dict[str, tuple[int, float]] = dict.fromkeys(self.vectors, (0, 0.0))
         for _ in range(0, n_steps, AT_ONCE):
             for task, vector in self.vectors.items():
@@ -38,9 +42,9 @@ class Tasks:
 
 
 def shares(paces: Mapping[str, Sequence[float]]) -> dict[str, Metric]:
-    """Compute the speeds of ids, and their ratios to that of the default id in the same round.
+    """Compute the speed of each id, and its ratio to that of the default id in the same round.
 
-    Each metric is the median over rounds, with the minimum and the maximum.
+    The value of each metric is the median over rounds; its interval is the range over rounds.
     """
     found = {f"task_steps_per_s.{task}": over(values, "1/s") for task, values in paces.items()}
     for task, values in paces.items():

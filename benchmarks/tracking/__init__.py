@@ -1,1 +1,1 @@
-"""The tracking benchmark, which runs every estimator on the same sequences."""
+"""The tracking benchmark, which runs all estimators on the same sequences."""

@@ -1,7 +1,7 @@
 """Motions that estimators do not expect: running, spinning, somersaults and falls.
 
-Bodies are those of `walks`. In somersaults and falls, they are rotated about the midpoint of the
-hips.
+The bodies are those of `walks`. In somersaults and falls, a body is rotated about the midpoint of
+its hips.
 """
 
 from dataclasses import dataclass, replace
@@ -15,22 +15,25 @@ from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
 
 FALLS_S, LIES_S = 2.0, 3.0
-"""Times at which people begin to fall, and at which they lie on the ground [s]."""
+"""Times at which people begin to fall and at which they lie on the ground [s]."""
 _GROUND_M, _HOP_M = 0.02, 0.4
 _PAUSE_S, _TRICK_S = (0.5, 1.5), (1.0, 1.4)
-"""Ranges of the time between two somersaults, and of the duration of one [s]."""
+"""Ranges (min, max) of the time between two somersaults and of the duration of a somersault [s]."""
 _LIES_PACE, _ROLL_RAD, _ROLL_S = 0.4, 1.5, (2.5, 5.0)
-"""Factor on the speed of a lying person's limbs; amplitude [rad] and range of the period [s] of
-rolling."""
+"""Factor on the speed of the limbs of a person on the ground, and amplitude [rad] and range of the
+period [s] of their rolling.
+"""
 _LIES_LOWER_M = 0.75
 SPINS_S, _EASED_S, _SPIN_RAD_S, _STEPS_HZ = 1.2, 0.4, (4.0, 8.0), 1.5
-"""Start of spinning and time to reach the full rate [s], rates [rad/s], and step rate [Hz]."""
+"""Start of the spinning and time to reach the full rate [s], range of the rate [rad/s], and step
+rate [Hz].
+"""
 _ON_THE_SPOT = Gait((0.1, 0.3, 0.5), thigh_rad=0.15, knee_rad=0.2)
 
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """Rotations of bodies about their hips (T, S) [rad], and vertical shifts [m]."""
+    """Rotations of bodies about their hips (T, S) [rad], and vertical displacements (T, S) [m]."""
 
     forward: Floats
     aside: Floats
@@ -40,7 +43,10 @@ class Turns:
 
 
 def run(walk_m: tuple[float, float], seeds: list[int], n_frames: int, speed_m_s: float) -> Points3:
-    """Return joints (T, S, J, 3) [m] of runners; their wrists and feet exceed 30 m/s^2."""
+    """Return joint positions (T, S, J, 3) of runners [m].
+
+    Their wrists and feet reach accelerations of more than 30 m/s^2.
+    """
     return walk(walk_m, seeds, n_frames, _runs(speed_m_s))
 
 
@@ -52,18 +58,21 @@ def _runs(speed_m_s: float) -> Gait:
 
 
 def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers with a somersault about every two seconds."""
+    """Return joint positions (T, S, J, 3) of walkers that do somersaults [m].
+
+    Each walker does one about every two seconds.
+    """
     joints = walk(walk_m, seeds, n_frames)
     tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
     return rotate(joints, Turns(*np.stack(tricks, -1)))
 
 
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers that fall, and roll from side to side."""
+    """Return joint positions (T, S, J, 3) of walkers that fall and roll from side to side [m]."""
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
     lying = _ease((time_s - FALLS_S) / (LIES_S - FALLS_S))
-    walked = np.cumsum(1 - lying[:, 0]) - 1  # frames of the walk, until they lie
+    walked = np.cumsum(1 - lying[:, 0]) - 1  # frames of the walk until the person is on the ground
     path = replace(
         path,
         ground=_at(path.ground, walked),
@@ -80,9 +89,9 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 
 
 def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of people that stand and gesture, then spin on the spot.
+    """Return joint positions (T, S, J, 3) of people that gesture, then spin on the spot [m].
 
-    They begin to spin at `SPINS_S`, at 4 to 8 rad/s.
+    They stand until `SPINS_S`, and then spin at 4 to 8 rad/s.
     """
     rngs = [np.random.default_rng([seed, 21]) for seed in seeds]
     rate, begin, x, y = np.array([
@@ -103,9 +112,9 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 def circle(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
 ) -> Points3:
-    """Return joints (T, S, J, 3) [m] of people that run in a circle around the centre.
+    """Return joint positions (T, S, J, 3) of people that run in a circle around the centre [m].
 
-    The direction is drawn for each seed.
+    The direction is sampled for each seed.
     """
     rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
     way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])
@@ -121,7 +130,7 @@ def circle(
 
 
 def rotate(joints: Points3, turns: Turns) -> Points3:
-    """Rotate joints (T, S, J, 3), and raise bodies that would be below the ground."""
+    """Rotate and shift joints (T, S, J, 3) [m]; raise bodies that would be below the ground."""
     left, right = joints[..., JOINT["left_hip"], :], joints[..., JOINT["right_hip"], :]
     hips, across = 0.5 * (left + right)[..., None, :], left - right
     level = about_axis("z", np.arctan2(across[..., 1], across[..., 0]) - np.pi / 2)
@@ -136,7 +145,7 @@ def rotate(joints: Points3, turns: Turns) -> Points3:
 
 
 def _ease(share: Floats) -> Floats:
-    """Return a smooth step from 0 to 1 with zero slope at both ends."""
+    """Evaluate a smooth step function, which rises from 0 to 1 with zero slope at both ends."""
     share = np.clip(share, 0.0, 1.0)
     return share**2 * (3 - 2 * share)
 
@@ -149,7 +158,7 @@ def _at(values: Floats, frame: Floats) -> Floats:
 
 
 def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
-    """Draw the `Turns` (4, T) of one body."""
+    """Sample the `Turns` (4, T) of the somersaults of one body."""
     turns = np.zeros((4, n_frames))
     begin_s = rng.uniform(*_PAUSE_S)
     while begin_s < n_frames * DT_S:

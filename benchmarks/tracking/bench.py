@@ -1,7 +1,7 @@
-"""The tracking benchmark, which runs every estimator on the same sequences.
+"""The tracking benchmark, which runs all estimators on the same sequences.
 
 The results of each rig, condition and estimator are written to DIR/parts as soon as they are
-complete, and a run that was stopped continues there. Parts of other versions or settings are
+complete, and an interrupted run continues from there. Parts with other versions or settings are
 computed again.
 """
 
@@ -31,7 +31,7 @@ from hrc_env.tracking.estimators import ESTIMATORS
 
 @dataclass(frozen=True, slots=True)
 class TrackingBench:
-    """The experiment, and its amount of data."""
+    """Benchmark of the estimators on simulated sequences."""
 
     name = "bench tracking"
     depends = ("env", "tracker", "emulator", "motion")
@@ -40,17 +40,17 @@ class TrackingBench:
     first_seed: int = 20_000
     """Seed of the first sequence; it increases by one with each further sequence.
 
-    No setting was chosen on these sequences, but on seeds 1000 to 1023, 5000 to 5023 and 7000 to
-    7023.
+    These sequences were not used to tune the estimators; the seeds 1000 to 1023, 5000 to 5023 and
+    7000 to 7023 were.
     """
     n_matched: int = 140
     """Number of matched sequences per rig."""
     n_smoothed: int = 18
-    """Number of first sequences per rig and condition on which the slow smoother runs."""
+    """Number of sequences per rig and condition on which the slow smoother runs."""
     timing_repeats: int = 7
-    """Number of measurements of the time of an update."""
+    """Number of repetitions of the time measurement of an update."""
     estimators: tuple[str, ...] = ()
-    """Names of estimators besides the default, as in `Selection`."""
+    """Names of estimators in addition to the default, as in `Selection`."""
     sequences: tuple[str, ...] = ()
     """Names of rigs and conditions, as in `Selection`."""
 
@@ -61,29 +61,29 @@ class TrackingBench:
 
     @property
     def selection(self) -> Selection:
-        """The part of the benchmark that is run."""
+        """Selection of the estimators and sequences that are run."""
         return Selection(self.estimators, self.sequences)
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds of sequences that are not matched."""
+        """Seeds of the sequences of all conditions except `matched`."""
         return list_seeds(self)
 
     @property
     def n_parts(self) -> int:
-        """Number of parts, one for each estimator on each condition, and for its time."""
+        """Number of parts: one per estimator, rig and condition, and one per time measurement."""
         run = self.selection
         return sum(len(run.names_of(each)) for _, each in run.conditions()) + len(run.timed())
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables and figures of a short run, or "" if it is long enough."""
+        """Warning for the tables and figures of a short run, or "" if the run is long enough."""
         return (
             describe_quick_run(self.n_seeds, find_durations()) if is_as_short(self, QUICK) else ""
         )
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         bench = asdict(self)
         for name in ("estimators", "sequences"):
             if not bench[name]:
@@ -97,9 +97,9 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return the parts of all estimators; times are measured at the end, one after the other.
+        """Return the results of all estimators; times are measured at the end, one after the other.
 
-        A part does not depend on which other parts are selected.
+        The result of a part does not depend on the selection of other parts.
         """
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
         cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
@@ -109,24 +109,24 @@ class TrackingBench:
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played, self.selection)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables of the documentation."""
+        """Return the tables that this benchmark fills in the documentation."""
         return (BENCH, times(self.selection.timed()))
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics, self.selection)
 
 
 QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
-"""The quick form, which computes every number from fewer sequences."""
+"""Benchmark settings for a quick run, which computes all numbers from fewer sequences."""
 
 
 def make_part(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
-    """Return the part of an estimator on one rig and condition."""
+    """Return the part of the benchmark for an estimator, a rig and a condition."""
     seeds = list_seeds(config, condition)
     n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
     make = partial(_run, rig_name, condition, tuple(seeds), n, name)
@@ -142,12 +142,12 @@ def _run(
 
 @lru_cache(maxsize=1)
 def _make_sequences(rig_name: str, condition: str, seeds: tuple[int, ...]) -> Sequences:
-    """Return the sequences of a condition; the last ones are cached for other estimators."""
+    """Return the sequences of a condition; the latest ones are cached for other estimators."""
     return make_sequences(_rig(rig_name), condition, list(seeds))
 
 
 def extend_key(name: str, key: str) -> str:
-    """Return the key of an estimator's parts, which depends on the source of a custom estimator."""
+    """Return the cache key of an estimator's parts, including the source of a custom estimator."""
     source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
@@ -164,7 +164,7 @@ def _rig(name: str) -> Rig:
 
 
 def _timing(config: TrackingBench, parts: PartCache) -> Parts:
-    """Measure microseconds per update of every estimator, on sequences in the lab."""
+    """Measure the time per update of all estimators on sequences in the lab [us]."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats

@@ -1,12 +1,12 @@
-"""The posterior Cramer-Rao bound of tracking a whole body.
+"""The posterior Cramer-Rao bound for tracking a whole body.
 
 Tichavsky, Muravchik and Nehorai, IEEE Trans. Signal Processing 46, 1998: the mean squared error of
-an estimator is at least the inverse of the information J, which evolves by
+an estimator is at least the inverse of the Fisher information J, which evolves by
 
     J' = (A J^-1 A' + Q)^-1 + sum over cameras H'H / sigma^2.
 
-As usual, A and Q of the transition and H of the cameras are evaluated at the truth of each drawn
-sequence. The recursion is implemented with covariances.
+As usual, the transition matrix A, the process noise Q and the measurement matrix H are evaluated at
+the true state of each sampled sequence. The recursion is implemented with covariances.
 """
 
 import numpy as np
@@ -18,10 +18,10 @@ from hrc_env.geometry.cameras import project
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:
-    """Return the Fisher information (S, J, 3, 3) of a frame of detections on each joint [1/m^2].
+    """Return the Fisher information (S, J, 3, 3) of a frame about each joint's position [1/m^2].
 
     Args:
-        P: projections of the cameras (C, 3, 4).
+        P: projection matrices of the cameras (C, 3, 4).
         joints: joint positions (S, J, 3) [m].
         seen: mask (S, C, J) of joints that a camera detects.
         sigma_px: standard deviation of a detection [px].
@@ -40,12 +40,12 @@ def posterior_bound(
     sigma_px: float,
     start_std: tuple[float, float] = (1.5, 1.0),
 ) -> Covariances3:
-    """Return a lower bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
+    """Return a lower bound (T, S, J, 3, 3) on the covariance of each joint's estimate [m^2].
 
     Args:
-        P: projections of the cameras (C, 3, 4).
+        P: projection matrices of the cameras (C, 3, 4).
         model: motion model.
-        joints: joint positions (T, S, J, 3) [m], drawn from the model.
+        joints: joint positions (T, S, J, 3) [m], sampled from the model.
         seen: mask (T, S, C, J) of joints that a camera detects.
         sigma_px: standard deviation of a detection [px].
         start_std: standard deviations of positions [m] and velocities [m/s] before the first frame.
@@ -64,7 +64,7 @@ def posterior_bound(
 
 
 def _shrink(cov: Floats, information: Floats) -> Floats:
-    """Update covariances (S, n, n) with information (S, m, m) on the first m states."""
+    """Update covariances (S, n, n) with information (S, m, m) about the first m states."""
     m = information.shape[-1]
     gain = np.linalg.solve(np.eye(m) + information @ cov[:, :m, :m], information)
     after = cov - cov[:, :, :m] @ gain @ cov[:, :m]
@@ -72,7 +72,7 @@ def _shrink(cov: Floats, information: Floats) -> Floats:
 
 
 def _block_diagonal(blocks: Covariances3) -> Floats:
-    """Return a block-diagonal matrix (S, 45, 45) from blocks (S, J, 3, 3)."""
+    """Return block-diagonal matrices (S, 45, 45) with the blocks (S, J, 3, 3)."""
     whole = np.zeros((len(blocks), N_JOINTS, 3, N_JOINTS, 3))
     each = np.arange(N_JOINTS)
     whole[:, each, :, each] = blocks.swapaxes(0, 1)
@@ -80,7 +80,7 @@ def _block_diagonal(blocks: Covariances3) -> Floats:
 
 
 def _joint_blocks(cov: Floats) -> Covariances3:
-    """Return the blocks of positions (S, J, 3, 3) of a covariance (S, 90, 90)."""
+    """Return the blocks (S, J, 3, 3) of the joints' positions in covariances (S, 90, 90)."""
     places = cov[:, :N_PLACES, :N_PLACES].reshape(len(cov), N_JOINTS, 3, N_JOINTS, 3)
     each = np.arange(N_JOINTS)
     return places[:, each, :, each].swapaxes(0, 1)

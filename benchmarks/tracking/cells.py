@@ -1,4 +1,4 @@
-"""Cells of the tracking benchmark: an estimator on the sequences of a rig and a condition."""
+"""Cells of the tracking benchmark, each of which runs an estimator on one rig and condition."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,16 +25,18 @@ from hrc_env.tracking.smoother import smooth
 UNKNOWN_M2 = 1e6
 """Variance of an unknown bone length [m^2]."""
 _AT_ONCE = 10
-"""Number of sequences that are smoothed together; the smoother stores 90x90 numbers per frame."""
+"""Number of sequences that are smoothed together, which limits memory: the smoother stores 90x90
+numbers per frame.
+"""
 
 
 class Belief(NamedTuple):
-    """The estimate after a frame."""
+    """Estimated joint positions after a frame."""
 
     mean_world: Points3
     """Estimated positions of joints (S, W, J, 3) [m]."""
     cov_world: Covariances3 | None
-    """Covariances of these (S, W, J, 3, 3) [m^2], or None if the estimator has none."""
+    """Covariances of the positions (S, W, J, 3, 3) [m^2], or None if the estimator has none."""
 
 
 class TrackedFrame(NamedTuple):
@@ -47,7 +49,7 @@ class TrackedFrame(NamedTuple):
 
 
 def beliefs(name: str, rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
-    """Yield the belief of an estimator after each frame."""
+    """Run an estimator and yield its belief after each frame."""
     if name == DLT:
         yield from _triangulate(rig, sequences)
     elif name == SMOOTHER:
@@ -58,7 +60,7 @@ def beliefs(name: str, rig: Rig, sequences: Sequences, seeds: list[int]) -> Iter
 
 
 def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[Belief]:
-    """Yield triangulations of each frame; joints without two views keep their last position."""
+    """Yield the triangulation of each frame; joints without two views keep their last position."""
     shape = sequences.joints.shape[1:]
     last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
     for px in sequences.px:
@@ -69,10 +71,10 @@ def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[Belief]:
 def _estimate(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[TrackedFrame]:
-    """Yield input and output of an estimator in each frame, as in an environment.
+    """Run an estimator as in an environment, and yield its input and output in each frame.
 
-    If there are several people, detected poses are assigned to the tracks with predictions that
-    they fit.
+    If there are several people, detected poses are assigned to the tracks by comparison with the
+    predictions.
     """
     n_sequences, n_people = sequences.joints.shape[1:3]
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
@@ -91,9 +93,9 @@ def _estimate(
 
 
 def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
-    """Yield the results of the smoother, which uses late frames at the time they were taken.
+    """Yield the results of the smoother, which uses delayed frames at the time they were taken.
 
-    If there are several people, it smooths the tracks to which `kalman` assigned the poses.
+    If there are several people, the poses are assigned to tracks by the estimator `kalman`.
     """
     if sequences.time_s is not None:
         px = restore_times(sequences.px, sequences.time_s)
@@ -116,7 +118,7 @@ def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief
 
 
 def _forget_bones(state: Any) -> None:
-    """Set the bone lengths in all hypotheses of an estimator to unknown."""
+    """Reset the bone lengths in all hypotheses of an estimator to unknown."""
     trees = getattr(state, "trees", None)
     if trees is not None:
         trees["bone_variance"][...] = UNKNOWN_M2
@@ -125,7 +127,7 @@ def _forget_bones(state: Any) -> None:
 def run_cell(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: PartProgress
 ) -> dict[str, Any]:
-    """Run an estimator; return the sums of `tally` per sequence for each window."""
+    """Run an estimator, and return the sums of `tally` per sequence for each window."""
     n_frames = len(sequences.joints)
     means = np.empty(sequences.joints.shape)
     covs = np.empty((*sequences.joints.shape, 3)) if name != DLT else None
@@ -143,7 +145,7 @@ def run_cell(
 def _window(
     frames: slice, sequences: Sequences, means: Points3, covs: Covariances3 | None
 ) -> dict[str, Any]:
-    """Return the sums of one window; each person is compared with one track."""
+    """Compute the sums of one window, in which each person is compared with one track."""
     truth, mean = sequences.joints[frames], means[frames]
     cov = None if covs is None else covs[frames]
     swaps = None
@@ -161,12 +163,12 @@ def _window(
 
 
 def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
-    """Sum up errors by name, as lists over sequences.
+    """Sum the errors in each sequence; return lists of sums over the sequences, by name.
 
     Args:
         truth: true joint positions (T, S, W, J, 3) [m].
         mean: estimated joint positions (T, S, W, J, 3) [m].
-        cov: covariances of these (T, S, W, J, 3, 3) [m^2], or None.
+        cov: covariances of the estimates (T, S, W, J, 3, 3) [m^2], or None.
     """
     n_frames, n_sequences = truth.shape[:2]
     offset = mean - truth
@@ -186,7 +188,7 @@ def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, 
 
 
 def _total(values: Floats | Bools) -> Floats:
-    """Return the sum (S,) of values (T, S, W, J)."""
+    """Return the sums (S,) of values (T, S, W, J) in each sequence."""
     return values.sum(axis=(0, 2, 3), dtype=float)
 
 

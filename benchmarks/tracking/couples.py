@@ -1,4 +1,4 @@
-"""Two people that walk past each other, with detections that are not labelled by person."""
+"""Sequences of two people that walk past each other, with detections that carry no identity."""
 
 import itertools
 from typing import NamedTuple
@@ -14,14 +14,14 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
 MEETING_S = 3.0
 """Time at which the two people are side by side [s]."""
 APART_M = 0.6
-"""Distance between their centres at that time [m]."""
+"""Distance between the centres of the two people at the time `MEETING_S` [m]."""
 _TRUNK_M, _LEAST_JOINTS = 0.18, 6
 _LOST_EVERY_S, _LOST_S = 4.0, (0.2, 0.8)
 _SURE_M = 0.3
 
 
 def walk_couples(seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, 2, J, 3) [m] of two walkers in opposite directions."""
+    """Return joint positions (T, S, 2, J, 3) of two people that walk in opposite directions [m]."""
     rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
     along = np.stack([rng.uniform(0, 2 * np.pi) for rng in rngs])
     middle = np.stack([rng.uniform(-0.2, 0.2, 2) for rng in rngs])
@@ -48,11 +48,11 @@ def walk_couples(seeds: list[int], n_frames: int) -> Points3:
 
 
 def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
-    """Return detections (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN if they are missing.
+    """Return detections (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3) [px]; NaN if missing.
 
-    Joints are lost as in `occluded`, and a trunk hides joints of the other person behind it. On
-    average every 4 s, each camera loses each person for 0.2-0.8 s. A person with fewer than six
-    joints is not reported.
+    Joints are lost as in the condition `occluded`, and the trunk of a person hides the joints of
+    the other person behind it. In addition, each camera loses each person on average every 4 s for
+    0.2 to 0.8 s. A person with fewer than six detected joints is not reported.
     """
     damage = Damage(occluded=True)
     px = np.stack(
@@ -67,7 +67,7 @@ def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
 
 
 def draw_shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
-    """Draw the order (T, S, C, D) in which each camera reports people in every frame."""
+    """Sample the order (T, S, C, D) in which each camera reports people in each frame."""
     one = np.tile(np.arange(n_people), (n_frames, n_cameras, 1))
     return np.stack([np.random.default_rng([seed, 8]).permuted(one, axis=-1) for seed in seeds], 1)
 
@@ -76,16 +76,17 @@ class Identities(NamedTuple):
     """Assignment of tracks to people in S sequences."""
 
     track: Ints
-    """Index of each person's track in the first frame (S, W)."""
+    """Index (S, W) of the track that is assigned to each person in the first frame."""
     n_changes: Floats
-    """Number of later changes of the assignment (S,)."""
+    """Number (S,) of changes of the assignment in later frames."""
 
 
 def match_identities(truth: Points3, mean: Points3) -> Identities:
     """Assign tracks to people, and count later changes of the assignment.
 
-    The assignment has the minimum total distance in the first frame. It changes if another one is
-    nearer by more than 0.3 m in total. True and estimated joints are (T, S, W, J, 3) [m].
+    The assignment has the minimum total distance in the first frame. It changes if the total
+    distance of another assignment is smaller by more than 0.3 m. True and estimated joints have
+    shape (T, S, W, J, 3) [m].
     """
     n_sequences, n_people = truth.shape[1:3]
     orders = np.array(list(itertools.permutations(range(n_people))))
@@ -128,7 +129,7 @@ def _passes(to_joints: Points3, to_other: Points3) -> Bools:
 
 
 def _draw_losses(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
-    """Draw a mask (T, C, 2) of frames in which a camera has lost a person."""
+    """Sample a mask (T, C, 2) of frames in which a camera does not detect a person."""
     lost = np.zeros((n_frames, n_cameras, 2), bool)
     for c, k in itertools.product(range(n_cameras), (0, 1)):
         t = rng.exponential(_LOST_EVERY_S / DT_S)

@@ -11,17 +11,17 @@ from hrc_env.experiments.report import Cells, Table
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of metric that is computed for every estimator and row."""
+    """A kind of metric that is computed for each estimator and table row."""
 
     title: str
     digits: int
     scale: float = 1.0
 
     def column(self, metric: str, name: str, heading: str) -> Column:
-        """Return the column of an estimator.
+        """Return the table column of an estimator.
 
         Args:
-            metric: name of the kind.
+            metric: name of the kind, one of `KINDS`.
             name: name of the estimator.
             heading: heading of the column.
         """
@@ -35,7 +35,7 @@ KINDS = {
     "std_over_rmse": Kind("Reported standard deviation / RMSE", 2),
     "facing_wrong": Kind("Percent of frames in which the torso faces the wrong way", 2, 100),
 }
-"""Kinds by their names in metrics; each has a table with one row per window."""
+"""Kinds of metrics by name; each has a table with one row per window."""
 SHOWN = (
     ("rmse_m", DEFAULT, f"`{DEFAULT}` [cm]"),
     ("coverage95", DEFAULT, "coverage"),
@@ -48,7 +48,7 @@ SHOWN = (
     ("rmse_m", SMOOTHER, f"`{SMOOTHER}` [cm]"),
     ("coverage95", SMOOTHER, "coverage"),
 )
-"""Columns in the documentation: kind, estimator and heading."""
+"""Columns of the table in the documentation: kind, estimator and heading."""
 WORDS = {
     "one_camera_half_second": "one camera, first 0.5 s",
     "one_camera_one_second": "one camera, first 1 s",
@@ -60,7 +60,7 @@ BATCHES = {"64": "batch of 64 [us]", "hard_64": "batch of 64, `hard` [us]", "1":
 
 
 def describe_rows(selection: Selection) -> dict[str, Cells]:
-    """Return the descriptions of every row by its key."""
+    """Return the descriptions of all table rows, by the key of the row."""
     return {
         f"{rig}.{window}": (f"{rig} {WORDS.get(window, window.replace('_', ' '))}",)
         for rig, _, window in selection.rows()
@@ -73,7 +73,7 @@ def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Ta
     Args:
         metric: one of `KINDS`.
         names: names of the estimators.
-        selection: the part of the benchmark that is run.
+        selection: selection of the estimators and sequences that are run.
     """
     kind = KINDS[metric]
     columns = [kind.column(metric, each, each) for each in names]
@@ -81,7 +81,7 @@ def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Ta
 
 
 def times(names: Sequence[str]) -> Table:
-    """Return the table of the times of updates.
+    """Return the table of the times per update.
 
     Args:
         names: names of the estimators.

@@ -1,6 +1,7 @@
 """Simulated detections of walkers.
 
-They have noise, correlated errors, occlusion, gross errors, and swapped left and right.
+The detections have white noise, correlated errors, occlusions, gross errors, and swapped left and
+right sides.
 """
 
 from dataclasses import dataclass
@@ -19,29 +20,32 @@ _DRIFT_TAU_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """The errors of simulated detections."""
+    """Parameters of the errors of simulated detections."""
 
     sigma_px: float = SIGMA_PX
-    """Standard deviation of white noise on each coordinate [px]."""
+    """Standard deviation of the white noise on each coordinate [px]."""
     drift_px: float = 0.0
-    """Standard deviation of errors with a correlation time of 0.5 s, on each coordinate [px].
+    """Standard deviation of the error on each coordinate with a correlation time of 0.5 s [px].
 
-    Estimators get no information about these errors.
+    Estimators receive no information about these errors.
     """
     occluded: bool = False
     """Whether joints are occluded.
 
-    On average every 5 s, each camera loses each joint for 0.5-2 s. On average every 6 s, only one
-    camera sees a joint for 0.5-1.5 s or, in one of five cases, none for 0.4-0.8 s.
+    Each camera loses each joint on average every 5 s for 0.5 to 2 s. In addition, on average every
+    6 s, a joint is visible in only one camera for 0.5 to 1.5 s or, in one of five cases, in no
+    camera for 0.4 to 0.8 s.
     """
     gross: float = 0.0
-    """Share of gross errors, with a standard deviation of about a third of the body's size."""
+    """Fraction of gross errors; their standard deviation is about a third of the body's size in the
+    image.
+    """
     swapped: float = 0.0
-    """Share of the time in which a camera swaps left and right, for about 6 frames at a time."""
+    """Fraction of frames in which a camera swaps left and right, in episodes of about 6 frames."""
     mirrored_start: bool = False
     """Whether two cameras swap left and right in the first frame."""
     alone_s: tuple[float, float] | None = None
-    """Start and end of the time in which only one camera sees the body [s]."""
+    """Start and end of the interval in which only one camera sees the body [s], or None."""
 
 
 CONDITIONS: dict[str, Damage] = {
@@ -66,14 +70,14 @@ SURPRISES: dict[str, Damage] = {
         Damage(alone_s=(1.0, 6.0)),
     ),
 }  # fmt: skip
-"""Errors for each condition of `tests/properties/test_sudden_motions.py`."""
+"""Errors of the detections, by condition of `tests/properties/test_sudden_motions.py`."""
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:
-    """Return detections (T, S, C, J, 2) of joints (T, S, J, 3), NaN if they are missing.
+    """Return detections (T, S, C, J, 2) of joints (T, S, J, 3) [px]; NaN if missing.
 
-    Each seed and kind of error has a random stream of its own, which makes conditions differ in
-    their errors only.
+    Each seed and kind of error has a separate random stream, so that conditions differ only in the
+    kinds of errors.
     """
     exact, depth = project(P, joints)
     exact, depth = exact.swapaxes(1, 2), depth.swapaxes(1, 2)
@@ -86,7 +90,7 @@ def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Poin
 
 
 def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
-    """Return the detections of one sequence, from exact pixels and a mask of joints in view."""
+    """Add errors to the exact pixels of one sequence, given a mask of the joints in view."""
     rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(5)]
     px = exact + damage.sigma_px * rngs[0].standard_normal(exact.shape)
     if damage.drift_px:
@@ -115,7 +119,7 @@ def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points
 
 
 def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Draw stationary noise (T, ...) of unit variance with the autocorrelation exp(-t / 0.5 s)."""
+    """Sample stationary noise (T, ...) of unit variance with autocorrelation exp(-t / 0.5 s)."""
     keep = np.exp(-DT_S / _DRIFT_TAU_S)
     drift = rng.standard_normal(shape)
     for t in range(1, len(drift)):
@@ -124,7 +128,7 @@ def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
 
 
 def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
-    """Draw a mask (T, C, J) of joints that are not occluded."""
+    """Sample a mask (T, C, J) of joints that are not occluded."""
     n_frames, n_cameras, n_joints = shape
     free = np.ones(shape, bool)
     for c in range(n_cameras):
@@ -146,7 +150,7 @@ def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
 
 
 def _swaps(rng: np.random.Generator, shape: tuple[int, ...], share: float) -> Bools:
-    """Draw a mask (T, C) of frames in which a camera swaps left and right."""
+    """Sample a mask (T, C) of frames in which a camera swaps left and right."""
     n_frames, n_cameras = shape
     swapped = np.zeros(shape, bool)
     pause = 6 / share * (1 - share)

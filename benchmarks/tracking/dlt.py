@@ -1,8 +1,8 @@
-"""Plain triangulation of each frame by direct linear transformation, as a reference.
+"""Triangulation of each frame by direct linear transformation (DLT), as a reference.
 
-Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. There are no weights, gates or
-refinement, and a joint that fewer than two cameras see keeps its position. The error measures the
-difficulty of a set of sequences.
+Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. The method has no weights,
+gates or refinement, and a joint that fewer than two cameras detect keeps its last position. Its
+error measures the difficulty of the sequences.
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:
-    """Triangulate points (S, J, 3) from pixels (S, C, J, 2), which are NaN if missing.
+    """Triangulate points (S, J, 3) from pixels (S, C, J, 2); missing pixels are NaN.
 
-    Joints that fewer than two cameras see keep their `last` position.
+    Joints that fewer than two cameras detect keep their `last` position.
     """
     seen = np.isfinite(px[..., 0])
     px = np.where(seen[..., None], px, 0.0)

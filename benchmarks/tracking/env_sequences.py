@@ -1,9 +1,9 @@
-"""A second, independent source of sequences: the environment's worker and its detector.
+"""A second, independent source of sequences: the environment's worker and detector emulator.
 
 The walkers of the benchmark (`walks`) and the environment's worker (`hrc_env.motion`) share no
-code. Neither do their detections: errors in the benchmark are white, while those of the
-environment's emulator last for half a second, have heavy tails, and may disagree with the reported
-confidence.
+code, and neither do their detections: errors in the benchmark are white, while those of the
+environment's emulator are correlated over half a second, have heavy tails, and may disagree with
+the reported confidence.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,12 +26,12 @@ from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
-"""Name of the rig of the environment's room with four cameras."""
+"""Name of the rig with the four cameras of the environment's room."""
 ENV_CONDITIONS = ("four_cameras", "two_cameras", "one_camera", "occluded")
-"""Conditions of the rig.
+"""Conditions of the rig `ENV`.
 
-The first three are without occlusion: all cameras, the first two, and only one for 4 s. In
-`occluded`, the room and a moving robot occlude the worker.
+The first three are without occlusion, with all cameras, with the first two cameras, and with only
+one camera for 4 s. In `occluded`, the room and a moving robot occlude the worker.
 """
 ENV_FRAMES = 150
 ALONE_FRAMES = slice(25, 125)
@@ -47,7 +47,7 @@ def make_env_rig() -> Rig:
 
 
 class EnvSequences(NamedTuple):
-    """One episode of the environment per seed."""
+    """Sequences from the environment, with one episode per seed."""
 
     joints_world: Points3
     """True joints (T, S, 1, J, 3) [m]."""
@@ -56,7 +56,7 @@ class EnvSequences(NamedTuple):
 
 
 def record(condition: str, seeds: list[int]) -> EnvSequences:
-    """Return the sequences of a condition, one per seed."""
+    """Simulate the sequences of a condition, one per seed."""
     episodes = _play_episodes(tuple(seeds))
     if condition == "occluded":
         return EnvSequences(episodes.joints_world, episodes.hidden)
@@ -71,7 +71,7 @@ def record(condition: str, seeds: list[int]) -> EnvSequences:
 
 
 def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
-    """Return keypoints, with those in the mask `blind` (..., C, W, J) set to missing."""
+    """Return a copy in which the keypoints in the mask `blind` (..., C, W, J) are missing."""
     return Keypoints(
         np.where(blind[..., None], np.nan, keypoints.px),
         np.where(blind, 0.0, keypoints.confidence),
@@ -82,7 +82,7 @@ def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
 def watch(
     simulation: Simulation, seeds: Sequence[int], pushes: list[np.random.Generator], n_frames: int
 ) -> Iterator[tuple[WorkerTruth, Surroundings]]:
-    """Yield workers and their surroundings, while the robot moves slowly at random (`pushes`)."""
+    """Simulate random slow motions of the robot (`pushes`); yield the workers and surroundings."""
     simulation.reset(np.arange(len(seeds)), [np.random.default_rng([seed, 9]) for seed in seeds])
     action = np.zeros((len(seeds), simulation.n_actions))
     for _ in range(n_frames):
@@ -95,7 +95,7 @@ def watch(
 
 
 class EmulatedDetector:
-    """The emulator for a batch of seeds, which returns keypoints of true poses in each frame."""
+    """The detector emulator for a batch of seeds, which converts true poses to keypoints."""
 
     def __init__(self, simulation: Simulation, rngs: list[np.random.Generator]) -> None:
         self.config, self.cameras, self.rngs = simulation.config, simulation.scene.cameras, rngs
@@ -111,7 +111,7 @@ class EmulatedDetector:
 
 
 class _Episodes(NamedTuple):
-    """Episodes of the environment, with keypoints without and with occlusion."""
+    """Episodes of the environment, with keypoints in both variants: without and with occlusion."""
 
     joints_world: Points3
     """True joints (T, S, 1, J, 3) [m]."""
@@ -123,7 +123,7 @@ class _Episodes(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _play_episodes(seeds: tuple[int, ...]) -> _Episodes:
-    """Play one episode per seed; the last episodes are cached."""
+    """Simulate one episode per seed; the latest episodes are cached."""
     simulation = simulate(len(seeds))
     free, hidden, pushes = (
         [np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)
@@ -150,7 +150,7 @@ def _stack(records: list[Keypoints]) -> Keypoints:
 
 
 def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
-    """Create a batch of environments without perception."""
+    """Create the simulation of a batch of environments, without perception."""
     config = config or HRCConfig()
     return Simulation(
         batch, resolve_settings(perception="none", estimator="triangulation", config=config)

@@ -1,10 +1,11 @@
-"""Motion drawn from the motion model of the estimators, with a known bound on estimation errors.
+"""Motion sampled from the estimators' motion model, with a known bound on estimation errors.
 
-The state has 90 numbers, the positions and velocities of all joints: x' = f(x) + w, w ~ N(0, Q). f
-damps every joint towards its position on the body relative to the root (the centre of the torso),
-which turns with the torso. Q consists of noise of each joint and an acceleration that all joints
-share. The bodies have no bones. The model of the Gaussian estimators is the same except for the
-positions on the body, which they learn, and the heading, whose error they ignore.
+The state has 90 numbers, the positions and velocities of all joints: x' = f(x) + w, w ~ N(0, Q).
+The function f damps the motion of each joint towards its nominal position relative to the root (the
+centre of the torso); the nominal positions turn with the torso. Q consists of the noise of each
+joint and an acceleration that all joints share. The bodies have no bones. The model of the Gaussian
+estimators is the same with two exceptions: they learn the nominal positions, and they ignore the
+error of the heading.
 """
 
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from hrc_env.tracking.tree.state import STANDING_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS
-"""Number of position coordinates in the state [m], followed by as many velocities [m/s]."""
+"""Number of position coordinates in the state [m]; the same number of velocities follows [m/s]."""
 _LEFT_RIGHT = np.zeros(N_JOINTS)
 _LEFT_RIGHT[TORSO] = (0.5, -0.5, 0.5, -0.5)
 _WARM_UP_FRAMES = 50
@@ -27,27 +28,29 @@ _WARM_UP_FRAMES = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedModel:
-    """A body that moves by the motion model of the estimators."""
+    """Motion model of a body that corresponds to the model of the estimators."""
 
     F: Floats
-    """Transition of (position, velocity) relative to the joint's position on the body (J, 2, 2)."""
+    """Transition matrices (J, 2, 2) of (position, velocity), relative to the joint's nominal
+    position.
+    """
     Q: Floats
     """Covariance of the process noise (90, 90)."""
     linear: Floats
-    """Derivative of f for a fixed heading of the body (90, 90)."""
+    """Jacobian of f for a fixed heading of the body (90, 90)."""
     offset: Floats
-    """Positions on the body relative to the root (J, 3): forward, left and up [m]."""
+    """Nominal positions of the joints relative to the root (J, 3): forward, left and up [m]."""
 
 
 def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel:
     """Return the motion model of `tracking.tree.predict` for the whole body at 25 Hz.
 
-    The arguments are settings of `ParticleConfig`.
+    The arguments have the meaning of the settings in `ParticleConfig`.
     """
     F, own = discretise_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)
-    # share of the root's (position, velocity) that a joint follows
+    # influence of the root's (position, velocity) on a joint
     along = np.array([[1, DT_S], [0, 1]]) - F
     linear = np.block(
         [[np.diag(F[:, i, k]) + along[:, i, k, None] * average for k in (0, 1)] for i in (0, 1)]
@@ -66,10 +69,10 @@ def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel
 
 
 def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
-    """Draw joints (T, S, J, 3) [m] of one body per seed.
+    """Sample joint positions (T, S, J, 3) of one body per seed [m].
 
     The motion begins two seconds before frame 0. Until frame 0, the root is held at rest above the
-    origin, since the body drifts without bound and should stay in view for a while.
+    origin: the body drifts without bound, and should remain in view for a while.
     """
     rngs = [np.random.default_rng([seed, 3]) for seed in seeds]
     place = model.offset + np.array([0.0, 0.0, 1.0])
@@ -87,9 +90,9 @@ def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
 
 
 def _centre(state: Floats) -> Floats:
-    """Shift a state to move the root above the origin and to rest.
+    """Shift a state so that the root is above the origin and at rest.
 
-    f is invariant to such shifts of all joints.
+    The dynamics f are invariant to such shifts of all joints.
     """
     body = state.reshape(len(state), 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
@@ -115,11 +118,11 @@ def advance(model: MatchedModel, state: Floats) -> Floats:
 
 
 def transition(model: MatchedModel, joints: Points3) -> Floats:
-    """Return the derivative of f (S, 90, 90) for bodies with joints (S, J, 3)."""
+    """Return the Jacobian of f (S, 90, 90) for bodies with joints (S, J, 3)."""
     angle = heading(joints)
     left = np.einsum("j,sji->si", _LEFT_RIGHT, joints)
     width2 = (left[:, :2] ** 2).sum(-1)
-    by_place = np.zeros_like(joints)  # of the angle
+    by_place = np.zeros_like(joints)  # derivative of the angle
     by_place[..., 0] = _LEFT_RIGHT * (-left[:, 1] / width2)[:, None]
     by_place[..., 1] = _LEFT_RIGHT * (left[:, 0] / width2)[:, None]
     level = np.array([1.0, 1.0, 0.0])
@@ -139,7 +142,7 @@ def heading(joints: Points3) -> Floats:
 
 
 def _rotate(offset: Floats, angle: Floats) -> Floats:
-    """Rotate offsets (J, 3) about the vertical axis by angles (S,); return (S, J, 3)."""
+    """Rotate offsets (J, 3) about the vertical axis by angles (S,); the result is (S, J, 3)."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = offset.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z + 0 * cos], -1)

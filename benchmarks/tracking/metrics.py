@@ -11,15 +11,15 @@ from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 
 TIMING = "timing"
-"""Name in place of a condition under which `Parts` holds times of updates [us]."""
+"""Name that replaces the condition in those keys of `Parts` that hold times per update [us]."""
 Parts: TypeAlias = dict[tuple[str, str, str], dict[str, Any]]
-"""Results of the cells by rig, condition and name of the estimator."""
+"""Results of the cells, by rig, condition and name of the estimator."""
 N_RESAMPLED = 1000
 _Sums: TypeAlias = Mapping[str, Floats]
 
 
 def compute_metrics(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
-    """Compute all metrics of the benchmark, by their dotted names."""
+    """Compute all metrics of the benchmark, by their names with dots."""
     metrics = _times(parts)
     for rig, condition, window in selection.rows():
         drawn = {
@@ -55,10 +55,10 @@ STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
         lambda sums: 100 * sums["identity_swaps"] / sums["one"],
     ),
 }
-"""Metrics as functions of sums over sequences.
+"""Unit of each metric, and function that computes it from sums over sequences, by name.
 
-The median is the mean of the medians of sequences. "facing_wrong" is the share of frames in which
-left and right of the torso are swapped.
+The metric "median_m" is the mean over the sequences of the median error in each. "facing_wrong" is
+the fraction of frames in which left and right of the torso are swapped.
 """
 _NEEDS = {
     **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
@@ -67,9 +67,9 @@ _NEEDS = {
 
 
 def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
-    """Return sums (1001, ...) over all sequences, and over 1000 draws with replacement.
+    """Return sums (1001, ...) over all sequences, and over 1000 bootstrap samples of them.
 
-    The draws depend on the number of sequences only, and are the same for all estimators.
+    The samples depend only on the number of sequences, and are the same for all estimators.
     """
     arrays = {name: np.array(values, float) for name, values in sums.items()}
     n = len(arrays["n"])
@@ -82,7 +82,7 @@ def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
 
 
 def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
-    """Return the metric of the first value, with the central 95 % interval of the others."""
+    """Return a metric with the first value, and the central 95 % interval of the others."""
     low, high = np.percentile(values[1:], (2.5, 97.5))
     n = factor * round(float(sums["one"][0]))
     return Metric(float(values[0]), float(low), float(high), unit, n)
@@ -98,7 +98,7 @@ def _times(parts: Parts) -> dict[str, Metric]:
 
 
 def _bounds(parts: Parts, name: str, rigs: Sequence[str]) -> dict[str, Metric]:
-    """Compute the ratio of the RMSE to its bound on each rig, and the RMS of these ratios."""
+    """Compute the ratio of the RMSE to its lower bound on each rig, and the RMS of these ratios."""
     drawn = {rig: resample_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
     squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
     both = np.sqrt(np.mean(list(squared.values()), axis=0))

@@ -9,24 +9,26 @@ from hrc_env.core.errors import check_names
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
-"""Name of the default estimator of an environment."""
+"""Name of the default estimator of the environments."""
 DLT = "dlt"
-"""Name of plain triangulation of each frame, with known identities of detections."""
+"""Name of the triangulation of each frame (DLT), which uses the true identities of detections."""
 SMOOTHER = "smoother"
-"""Name of the smoother, which uses the whole clip and is not compared with the bound of filters."""
+"""Name of the smoother, which uses the whole sequence and is not compared with the bound for
+filters.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The part of the benchmark that is run."""
+    """Selection of the estimators and sequences of the benchmark."""
 
     estimators: tuple[str, ...] = ()
-    """Names of estimators besides the default; all if empty."""
+    """Names of estimators in addition to the default; all if empty."""
     sequences: tuple[str, ...] = ()
     """Names of rigs and conditions, e.g. "lab", "hard" or "lab.hard"; all if empty."""
 
     def check(self) -> None:
-        """Raise `ConfigError` if a name is unknown, with the valid names."""
+        """Raise `ConfigError` if a name is unknown; the message lists the valid names."""
         check_names("estimator", self.estimators, [*ESTIMATORS, DLT, SMOOTHER])
         pairs = _all_conditions()
         known = [*RIGS, ENV, *dict.fromkeys(name for _, name in pairs), *map(".".join, pairs)]
@@ -42,22 +44,22 @@ class Selection:
         ]  # fmt: skip
 
     def rivals(self) -> list[str]:
-        """Return the selected causal estimators other than the default."""
+        """Return the names of the selected causal estimators other than the default."""
         others = [*(name for name in ESTIMATORS if name != DEFAULT), DLT]
         return [name for name in others if not self.estimators or name in self.estimators]
 
     def names_of(self, condition: str) -> list[str]:
-        """Return the estimators that run on a condition, beginning with the default."""
+        """Return the names of the estimators that run on a condition; the default is the first."""
         smooths = not self.estimators or SMOOTHER in self.estimators
         last = [SMOOTHER] if smooths and condition != MATCHED else []
         return [DEFAULT, *self.rivals(), *last]
 
     def timed(self) -> list[str]:
-        """Return the estimators for which updates are timed."""
+        """Return the names of the estimators for which the time of an update is measured."""
         return [name for name in ESTIMATORS if name in (DEFAULT, *self.rivals())]
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return (rig, condition, window) of every row of the tables."""
+        """Return the (rig, condition, window) of all table rows."""
         return [
             (rig, condition, window)
             for rig, condition in self.conditions()
@@ -65,7 +67,7 @@ class Selection:
         ]
 
     def rigs_of(self, condition: str) -> list[str]:
-        """Return the simulated rigs for which a condition is selected."""
+        """Return the names of the simulated rigs for which a condition is selected."""
         return [rig for rig in RIGS if (rig, condition) in self.conditions()]
 
 
@@ -75,9 +77,9 @@ def _all_conditions() -> list[tuple[str, str]]:
 
 
 EVERYTHING = Selection()
-"""Selection of the whole benchmark."""
+"""The selection that contains the whole benchmark."""
 
 
 def rows() -> list[tuple[str, str, str]]:
-    """Return (rig, condition, window) of every row of the whole benchmark."""
+    """Return the (rig, condition, window) of all table rows of the whole benchmark."""
     return EVERYTHING.rows()

@@ -26,7 +26,7 @@ but still learn the joints' positions on the body. The bound is the mean over th
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
-    """Return the report, in which sections without results are left out."""
+    """Return the report, without sections that have no results."""
     rivals = [DEFAULT, *selection.rivals()]
     with_names = [name for name in rivals if name != DLT]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
@@ -49,7 +49,7 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:
-    """Return a table of the default estimator, the paper's algorithm and the best of the others."""
+    """Return a table of the default estimator, the paper's algorithm and the best other one."""
     lines, rivals = list[list[str]](), selection.rivals()
     header = ["", "RMSE, cm", "coverage", "std/RMSE"]
     header += ["paper, cm"] if "paper" in rivals else []
@@ -85,8 +85,8 @@ def _by_rig(
         metrics: metrics by name.
         names: names of the estimators.
         rigs: names of the rigs.
-        kinds: patterns of the names of metrics, by title.
-        above: rows above those of the rigs.
+        kinds: patterns of the metrics' names, by title.
+        above: additional rows at the top of the table.
     """
     lines = list(above)
     for rig, (title, key) in product(rigs, kinds.items()):

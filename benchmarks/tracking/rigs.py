@@ -13,14 +13,14 @@ from hrc_env.tracking.config import ParticleConfig
 DT_S = 0.04
 """Time between frames [s]."""
 SIGMA_PX = 3.0
-"""Standard deviation of a detection [px], which is known to the estimators."""
+"""Standard deviation of the detections [px], which the estimators know."""
 WIDTH_PX, HEIGHT_PX = 1920, 1080
 _CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """Four cameras around a room, and the area in which people walk."""
+    """Four cameras, the area in which people walk, and settings of the estimators."""
 
     name: str
     P: Floats
@@ -28,7 +28,7 @@ class Rig:
     walk_m: tuple[float, float]
     """Half the length and width of the area in which people walk [m]."""
     tracker: ParticleConfig
-    """Settings of the estimators, with the prior position of a worker."""
+    """Settings of the estimators, including the prior position of a worker."""
 
 
 def make_rig(name: str) -> Rig:

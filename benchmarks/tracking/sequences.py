@@ -1,4 +1,4 @@
-"""The sequences of the tracking benchmark, with inputs of estimators and ground truth."""
+"""The sequences of the tracking benchmark, with the estimators' inputs and the ground truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -22,11 +22,14 @@ from hrc_env.tracking.config import TrackerConfig
 
 MATCHED, TWO_WORKERS, LATE = "matched", "two_workers", "late"
 SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
-"""Conditions of the rigs lab and site; in `matched`, a bound on the mean squared error is known."""
+"""Conditions of the rigs lab and site. For `matched`, a lower bound on the mean squared error is
+known.
+"""
 MATCHED_ROOT_ACCELERATION = 0.05
-"""Acceleration of the root in matched sequences and in the estimators on them [m^2/s^3].
+"""Spectral density of the root's acceleration in matched sequences, also for the estimators
+[m^2/s^3].
 
-It is small to keep the bodies in view.
+The value is small, so that the bodies remain in view.
 """
 MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "running": partial(run, speed_m_s=3.0),
@@ -42,7 +45,7 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
 }
-"""Functions for motions other than walking, by condition."""
+"""Functions that simulate motions other than walking, by condition."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
@@ -83,40 +86,42 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
-"""Windows of frames that are evaluated, by condition.
+"""Windows (first frame, end) that are evaluated, by condition and name of the window.
 
-Most begin after the first second. Others cover the time with one camera, begin one second after the
-other cameras return, half a second after a mirrored start, or at a fall. Matched sequences are
-short, to keep the drifting body in the images.
+Most windows begin after the first second. Others cover the time with one camera, or begin one
+second after the other cameras return, half a second after a mirrored start, or at a fall. Matched
+sequences are short, so that the drifting body remains in the images.
 """
 ENV_WINDOWS = {
     **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
     "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
 }
-"""Windows of frames that are evaluated on the environment's rig, by condition."""
+"""Windows (first frame, end) that are evaluated on the environment's rig, by condition and name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sequences:
-    """Sequences in a batch: S sequences of T frames with W people, from C cameras."""
+    """A batch of S sequences, each with T frames of W people from C cameras."""
 
     joints: Points3
     """True joints (T, S, W, J, 3) [m]."""
     px: Points2
-    """Detected pixels of each person (T, S, C, W, J, 2), NaN if they are missing."""
+    """Detected pixels of each person (T, S, C, W, J, 2); NaN if missing."""
     windows: dict[str, tuple[int, int]]
-    """First frame and end of each window by name."""
+    """Windows (first frame, end), by name."""
     config: TrackerConfig
     confidence: Floats | None = None
-    """Confidence (T, S, C, W, J); None for 0.9 for all detections."""
+    """Confidence (T, S, C, W, J); None means 0.9 for all detections."""
     sigma_px: Floats | None = None
-    """Standard deviation (T, S, C, W, J) [px]; None for `SIGMA_PX` for all detections."""
+    """Standard deviation (T, S, C, W, J) [px]; None means `SIGMA_PX` for all detections."""
     order: Ints | None = None
-    """Order in which cameras report people, without labels (T, S, C, W); None if there is one
-    person."""
+    """Order (T, S, C, W) in which cameras report people without identities, or None if there is
+    only one person.
+    """
     time_s: Floats | None = None
-    """Time at which each delivered frame was taken (T, S, C) [s], as in `Keypoints`; None if frames
-    are current."""
+    """Time (T, S, C) at which each delivered frame was taken [s], as in `Keypoints`; None if frames
+    are not delayed.
+    """
     bound_m2: Floats | None = None
     """Lower bound on the mean squared error (T, S, J) [m^2], or None if it is unknown."""
 
@@ -154,7 +159,7 @@ class Sequences:
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     """Create the sequences of a rig and a condition, one per seed.
 
-    Each sequence depends on its own seed only.
+    Each sequence depends only on its seed.
     """
     if rig.name == ENV:
         joints, seen = record(condition, seeds)
@@ -178,10 +183,11 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
 
 
 def _make_matched(rig: Rig, seeds: list[int]) -> Sequences:
-    """Create sequences from the estimators' motion model, with matching settings of estimators.
+    """Create sequences from the estimators' motion model, with matching settings.
 
-    The settings are the shared acceleration, no outliers, no swapped sides, detections with the
-    reported noise, no bones, no floor, and bodies of any size.
+    The estimators are configured for the same root acceleration and for detections with the
+    reported noise, without outliers, swapped sides, bones, floor, or limits on the size of the
+    body.
     """
     config = replace(
         rig.tracker,

@@ -1,4 +1,4 @@
-"""Measurement of the time of an update, including the prediction."""
+"""Measurement of the time of an estimator's update, including the prediction."""
 
 import time
 from typing import Any
@@ -18,13 +18,13 @@ _N_FRAMES, _FIRST = 75, 25
 def time_estimator(
     name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: PartProgress
 ) -> dict[str, list[float]]:
-    """Measure microseconds per worker and update, with one number per repeat.
+    """Measure the time per worker and update [us], with one number per repetition.
 
-    The results are medians over frames of `clean` at batch sizes 1 and 64 ("1", "64"), and the mean
-    over frames of `hard` at batch size 64 ("hard_64").
+    The results are medians over the frames of `clean` at batch sizes 1 and 64 ("1", "64"), and the
+    mean over the frames of `hard` at batch size 64 ("hard_64").
     """
     times: dict[str, list[float]] = {"1": [], "64": [], "hard_64": []}
-    _frame_times(name, rig, clean, 1, 2)  # compiles
+    _frame_times(name, rig, clean, 1, 2)  # the first run compiles functions
     for _ in range(n_repeats):
         times["1"].append(float(np.median(_frame_times(name, rig, clean, 1))))
         times["64"].append(float(np.median(_frame_times(name, rig, clean, BATCH))))
@@ -36,7 +36,7 @@ def time_estimator(
 def _frame_times(
     name: str, rig: Rig, sequences: Sequences, batch: int, n_frames: int = _N_FRAMES
 ) -> Floats:
-    """Measure microseconds per worker in each frame after the first second."""
+    """Measure the time per worker in each frame after the first second [us]."""
     estimator: Any = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([b, 5]) for b in range(batch)]
     state = estimator.init(batch, 1)

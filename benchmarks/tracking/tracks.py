@@ -1,8 +1,8 @@
-"""Workers and their tracks in each frame, for tests of predictions.
+"""True and estimated motion of workers in each frame, for tests of predictions.
 
-There are two sources: the worker of the environment, detected by the emulator, with a moving robot
-and optional camera failures; and the walkers of the tracking benchmark, to which no predictor was
-fitted.
+The motion has two sources: the worker of the environment, which the emulator detects, with a moving
+robot and optional camera failures; and the walkers of the tracking benchmark, on which no predictor
+was tuned.
 """
 
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
 
 LIVELY = {"dwell_s": (0.5, 4.0), "near_probability": 0.5}
-"""Changes to `MotionConfig` that make a worker walk for about half of the time."""
+"""Arguments of `MotionConfig` with which a worker walks for about half of the time."""
 _FAILURE_S, _BETWEEN_S = (0.4, 3.0), 1.5
 Look = Callable[[Estimator[Any], Any], Any]
 
@@ -38,17 +38,19 @@ class Tracks:
     speed: Velocities3
     """True velocities (T, S, J, 3) [m/s]; NaN if the source does not provide them."""
     estimates: list[PoseEstimate] = field(default_factory=list)
-    """Estimates of all frames, each (S, 1, J, ...)."""
+    """Estimates (S, 1, J, ...) after each frame."""
     looks: list[Any] = field(default_factory=list)
-    """Results of the function `look` of the estimator and its state, after each frame."""
+    """Results of the function `look`, which is called with the estimator and its state after each
+    frame.
+    """
 
 
 def _report_nothing(estimator: Estimator[Any], state: Any) -> None:
-    """Return None, as the default `look`."""
+    """Return None; this is the default function `look`."""
 
 
 class _Follower:
-    """An estimator that receives frames one after the other."""
+    """An estimator that processes frames one after the other and appends to `Tracks`."""
 
     def __init__(self, tracks: Tracks, look: Look, P: Floats, config: TrackerConfig,
                  rngs: list[np.random.Generator]) -> None:  # fmt: skip
@@ -68,7 +70,7 @@ class _Follower:
 def follow_walkers(
     seeds: list[int], n_frames: int, condition: str, look: Look = _report_nothing
 ) -> Tracks:
-    """Track the benchmark's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
+    """Track the benchmark's walkers in its lab under a condition of `tracking.detections`."""
     rig = make_rig("lab")
     joints = walk(rig.walk_m, seeds, n_frames)
     tracks = Tracks(joints, np.full_like(joints, np.nan))
@@ -88,15 +90,15 @@ def follow_env(
     failing: bool = False,
     look: Look = _report_nothing,
 ) -> Tracks:
-    """Track the worker of the environment at level `keypoints`, in one episode per seed.
+    """Track the worker of the environment at level `keypoints` in one episode per seed.
 
     Args:
         seeds: seeds of the episodes.
         n_frames: number of frames.
-        lively: whether workers walk more than by default.
-        failing: whether, after the first second, all cameras but one or two fail at times, for up
-            to 3 s.
-        look: function of the estimator and its state that is called after every frame.
+        lively: whether workers walk more than with the default settings.
+        failing: whether all cameras except one or two fail repeatedly after the first second, for
+            up to 3 s at a time.
+        look: function of the estimator and its state, which is called after each frame.
     """
     config = HRCConfig()
     if lively:
@@ -119,7 +121,7 @@ def follow_env(
 
 
 def _failures(seeds: list[int], n_frames: int, n_cameras: int, failing: bool) -> Bools:
-    """Draw a mask (T, S, C) of frames in which a camera fails."""
+    """Sample a mask (T, S, C) of frames in which a camera fails."""
     blind = np.zeros((n_frames, len(seeds), n_cameras), bool)
     for s, seed in enumerate(seeds if failing else []):
         rng = np.random.default_rng([seed, 13])

@@ -1,8 +1,8 @@
 """Seeded motion of people who walk and gesture, with rigid bones.
 
-It is independent of the package's motion generator, with which estimators were tuned. A walker
-steers through the area at 0.9 to 1.5 m/s and turns back before its edge. The legs swing with the
-stride, and the arms gesture in bursts with wrist speeds of up to 3 m/s.
+This motion is independent of the package's motion generator, on which the estimators were tuned. A
+walker moves through the area at 0.9 to 1.5 m/s and turns back before its edge. The legs swing with
+the stride, and the arms gesture intermittently with wrist speeds of up to 3 m/s.
 """
 
 from dataclasses import dataclass
@@ -16,10 +16,11 @@ from hrc_env.geometry.rotations import about_axis
 
 _SUBSTEPS = 8
 _SHORTEST = 500
-"""Minimum number of frames over which noise is scaled to unit variance; shorter walks are cut from
-longer ones."""
+"""Minimum number of frames over which noise is scaled to unit variance; shorter walks are the
+beginnings of longer ones.
+"""
 _NOISE_TAU_S = (1.5, 0.8, 1.2, 0.6, 0.6)
-"""Time scales of noise in speed, steering, leaning and the gestures of both arms [s]."""
+"""Time scales of the noise in speed, steering, lean and the gestures of both arms [s]."""
 _TURN_RATE, _TURN_TAU_S = 2.5, 0.25
 _UPPER_ARM_M, _FOREARM_M, _THIGH_M, _SHANK_M, _FOOT_M = 0.29, 0.26, 0.43, 0.42, 0.15
 _HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
@@ -50,7 +51,7 @@ WALKING = Gait((0.9, 1.25, 1.5))
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Paths of S walkers and phases of their limbs, in T frames of 0.04 s; arrays (T, S)."""
+    """Paths of S walkers and phases of their limbs in T frames of 0.04 s, as arrays (T, S)."""
 
     ground: Floats
     """Position on the ground (T, S, 2) [m]."""
@@ -59,36 +60,36 @@ class Path:
     """Phase of the gait cycle [rad]."""
     lean: Floats
     gesture: Floats
-    """Intensity of gestures of the left and right arm (T, S, 2), in [0, 1]."""
+    """Intensity of the gestures of the left and right arm (T, S, 2), in [0, 1]."""
     gait: Gait = WALKING
 
 
 def walk(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Points3:
-    """Return joints (T, S, J, 3) [m] of one walker per seed, at 25 Hz.
+    """Return joint positions (T, S, J, 3) of one walker per seed at 25 Hz [m].
 
-    Each walker depends on its own seed only. The area around the origin has twice the size `walk_m`
-    (length, width).
+    Each walker depends only on its seed. The area is centred at the origin; `walk_m` is half of its
+    length and width.
     """
     return walk_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
 
 
 def walk_along(path: Path) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers that follow a path."""
+    """Return joint positions (T, S, J, 3) of walkers that follow paths [m]."""
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
     joints[..., :2] += path.ground[:, :, None]
     joints[..., 2] += (_HIP_HEIGHT_M + path.gait.bounce_m * np.cos(2 * path.stride))[..., None]
     below = _GROUND_M - joints[..., 2].min(-1)
-    joints[..., 2] += np.maximum(below, 0.0)[..., None]  # the whole body, so that bones stay rigid
+    joints[..., 2] += np.maximum(below, 0.0)[..., None]  # keeps bones rigid
     return joints
 
 
 def steer(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Path:
-    """Simulate the steering of one walker per seed in substeps; return the path in frames."""
+    """Simulate the steering of one walker per seed in substeps, and return the paths per frame."""
     dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     starts = np.stack([rng.uniform(-0.5, 0.5, 3) for rng in rngs])
@@ -123,7 +124,7 @@ def steer(
 
 
 def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
-    """Draw white noise (5, n), smoothed by Gaussian windows and scaled to unit variance.
+    """Sample white noise (5, n), smoothed by Gaussian windows and scaled to unit variance.
 
     The widths of the windows are `_NOISE_TAU_S`.
     """
@@ -137,12 +138,12 @@ def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
 
 
 def _limb(angle: Floats, length_m: float) -> Points3:
-    """Return the vector along a limb, which hangs down at angle 0 and swings forward."""
+    """Return vectors along a limb that hangs down at angle 0 and swings forward [m]."""
     return length_m * np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1)
 
 
 def _body(path: Path) -> Points3:
-    """Return joints (T, S, J, 3) relative to the midpoint of the hips: x forward, y left, z up."""
+    """Return joints (T, S, J, 3) relative to the midpoint of the hips (forward, left, up) [m]."""
     body = np.zeros((*path.heading.shape, N_JOINTS, 3))
     lean, upright = np.sin(path.lean), np.cos(path.lean)
     level = np.zeros_like(lean)
@@ -164,7 +165,7 @@ def _body(path: Path) -> Points3:
 
 
 def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
-    """Return positions of hip, knee, ankle and foot of one side."""
+    """Return the positions of hip, knee, ankle and foot of one side [m]."""
     thigh = gait.thigh_rad * np.sin(swing)
     shank = thigh - 0.15 - gait.knee_rad * np.clip(np.cos(swing), 0, 1) ** 2
     hip = np.broadcast_to(np.array([0.0, 0.11 * sign, 0.0]), (*swing.shape, 3))
@@ -176,7 +177,7 @@ def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
 def _arm(
     shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats, gait: Gait
 ) -> tuple[Points3, ...]:
-    """Return positions of shoulder, elbow and wrist of one side.
+    """Return the positions of shoulder, elbow and wrist of one side [m].
 
     A gesture raises, spreads and shakes the arm.
     """

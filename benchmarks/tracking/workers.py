@@ -1,6 +1,6 @@
-"""Workers of the environment that run and fall, as a second source of such motions.
+"""Workers of the environment that run or fall, as a second source of such motions.
 
-Their bodies are the eight of the package, in turns. They share no code with the walkers of
+Successive seeds use the eight bodies of the package in turn. The motion shares no code with
 `athletes`.
 """
 
@@ -18,11 +18,13 @@ from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
 _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
-"""Speeds of running and walking [m/s], duration of lying [s], and desired length of a walk [m]."""
+"""Speeds of running and walking [m/s], range of the time on the ground [s], and desired length of a
+walk [m].
+"""
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner at top speed."""
+    """Return joints (T, S, J, 3) of workers that run from corner to corner at top speed [m]."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _plan_across(me)
@@ -32,7 +34,7 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers that walk, fall, lie for 2 to 4 s and get up."""
+    """Return joints (T, S, J, 3) of workers that walk, fall, and get up after 2 to 4 s [m]."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _plan_across(me, _WAY_M)
@@ -51,7 +53,7 @@ def _plan_across(me: Worker, most_m: float = np.inf) -> float:
 
 
 def _play_act(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) of workers that start in a corner and repeat an activity."""
+    """Return joints (T, S, J, 3) of workers that start in a corner and repeat an activity [m]."""
     sequences = []
     for seed in seeds:
         rng = np.random.default_rng([seed, 11])

@@ -18,8 +18,8 @@ class Benchmark(EngineArguments):
 
     The setups differ in the workers (unaware, hurried or attentive), the perception (four cameras,
     delayed frames, one camera or the true poses) and the shield (without or with one). The report
-    contains goals per minute, contacts by kind, and cost. Finished parts are kept in the folder,
-    and a run that was stopped continues there.
+    contains goals per minute, contacts by kind, and cost. The results of completed parts are cached
+    in the folder, from which a stopped run resumes.
     """
 
     policy: str
@@ -27,22 +27,23 @@ class Benchmark(EngineArguments):
     `train` or Stable-Baselines3, .zip, or a policy of `export`, .safetensors); or MODULE:FUNCTION,
     a function that takes an EnvInfo and returns an object with act(observation)."""
     trust: bool = False
-    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see play)."""
+    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see the command
+    play)."""
     ids: tuple[str, ...] = tuple(BUILT_IN)
     """Ids of the environments, including those registered by --import. A learnt policy fits only
     one environment."""
     control: str | None = None
-    """Control mode of the policy's actions: joint (default), tool or twist. Checkpoints contain
-    their control mode."""
+    """Control mode of the policy's actions: joint (default), tool or twist. A checkpoint contains
+    the control mode of its policy."""
     out: Path | None = None
     """Folder for report.html and results.json (default: out/benchmark/POLICY)."""
     seeds: int = 64
-    """Number of episodes per row."""
+    """Number of episodes in each setup."""
     enter: Path | None = None
-    """Also write an entry for the leaderboard to this JSON file; in a clone,
-    docs/results/leaderboard/NAME.json."""
+    """JSON file to which an entry for the leaderboard is also written; in a clone of the
+    repository, docs/results/leaderboard/NAME.json."""
     overwrite: bool = False
-    """Delete results of another run or of other settings in the folder."""
+    """Delete results in the folder that belong to another run or to other settings."""
 
     def run(self) -> int:
         """Run the benchmark and print its report; return the exit status."""

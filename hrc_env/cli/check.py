@@ -24,19 +24,20 @@ class Finding(NamedTuple):
 
     is_ok: bool
     message: str
-    """Version or state that was found, or the remedy."""
+    """Version or state that the check found, or the remedy for a failure."""
 
 
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
 DRAW = "from hrc_env.scene import gl; ok, text = gl.gl_status(); print(text); ok or exit(1)"
-"""Code that draws a pixel and prints the renderer, or the remedy."""
+"""Python code that renders a pixel and prints the name of the renderer, or the remedy for a
+failure."""
 NAMES = (
     "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
     "environment",
 )  # fmt: skip
-"""Names of the checks, each of which is done by the function `_check_NAME`."""
+"""Names of the checks. The function `_check_NAME` performs the check NAME."""
 LITTLE_GB = 2.0
-"""Memory that the level `pixels` and films need [GB]."""
+"""Memory that the perception level `pixels` and films require [GB]."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def _check_triton() -> Finding:
 
 
 def _run_in_process(code: str) -> Finding:
-    """Run Python code in a new process and return its success and its last line of output."""
+    """Run Python code in a new process; return its success and its last line of output."""
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     if done.returncode < 0:

@@ -20,7 +20,7 @@ def check_writable_folder(path: Path, option: str = "--out") -> None:
 
 
 def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> None:
-    """Raise an error if no file of this name and ending can be written.
+    """Raise an error if a file cannot be written or its name lacks the required ending.
 
     Raises:
         ConfigError: the name has another ending.
@@ -33,7 +33,7 @@ def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> 
 
 
 def _explain_unwritable(folder: Path) -> str:
-    """Return why a folder, or its nearest existing parent, is not writable, or "" if it is."""
+    """Return the reason why a folder or its nearest existing parent is not writable, or ""."""
     there = folder.absolute()
     while not there.exists() and there != there.parent:
         there = there.parent

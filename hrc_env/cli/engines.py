@@ -12,18 +12,18 @@ class EngineArguments:
     """Options of the engine that computes the parts of a run; it does not affect the results."""
 
     stays: ClassVar[str] = ""
-    """Reason why the command supports no engine but serial; "" if it supports all."""
+    """Reason why the command supports only the engine `serial`; "" if it supports all engines."""
     engine: str | None = None
     """Engine: serial (one part after the other), processes (one part per core in parallel) or ray
     (tasks of a cluster; docs/many_machines.md). Default: the fastest on this machine."""
     workers: int | None = None
     """With processes and ray: number of parts computed in parallel (default: number of cores)."""
     address: str | None = None
-    """With ray: address of the cluster, as auto, HOST:6379 or ray://HOST:10001 (default: a new
+    """With ray: address of the cluster, such as auto, HOST:6379 or ray://HOST:10001 (default: a new
     cluster on this machine)."""
 
     def choose_engine(self) -> Engine | None:
-        """Return the engine of the options, or None if none is named.
+        """Return the engine that the options select, or None if they select none.
 
         Raises:
             ConfigError: the engine does not exist, does not accept workers or an address, or is not

@@ -34,7 +34,7 @@ def show_errors(run: Callable[[], int]) -> int:
 def import_first(words: Sequence[str], program: str) -> list[str]:
     """Import the files that `--import FILE` names, and return the remaining arguments.
 
-    Files that the parent process imported are imported, too.
+    Files that the parent process imported are also imported.
     """
     words = list(words)
     while "--import" in words:

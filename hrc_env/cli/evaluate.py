@@ -22,8 +22,9 @@ from hrc_env.tasks import DEFAULT
 class Evaluate(EnvironmentArguments, EngineArguments):
     """Evaluate an agent over whole episodes with fixed seeds: goals, contacts and cost.
 
-    Episodes are played on one machine or on a cluster. The first episode has the seed --seed, and
-    each further episode the next one; the k-th episode is the same for every agent and engine.
+    Episodes are played on one machine or on a cluster. The seed of the first episode is --seed, and
+    it increases by one with each further episode. The k-th episode is the same for every agent and
+    engine.
     """
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
@@ -33,7 +34,8 @@ class Evaluate(EnvironmentArguments, EngineArguments):
     `train` or Stable-Baselines3, .zip, or a policy of `export`, .safetensors); or MODULE:FUNCTION,
     a function that takes an EnvInfo and returns an object with act(observation)."""
     trust: bool = False
-    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see play)."""
+    """Allow pickles in a checkpoint, which can run arbitrary code, to be loaded (see the command
+    play)."""
     episodes: int = 64
     """Number of episodes."""
     seed: int = 1_000_000
@@ -41,7 +43,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
     perception: str = "keypoints"
     """Perception level: keypoints (camera emulator), pixels, truth or none."""
     out: Path | None = None
-    """Also write the score, agent, seed and environment to this JSON file."""
+    """JSON file to which the score, agent, seed and environment are also written."""
 
     def run(self) -> int:
         """Play the episodes and print the score; return the exit status."""

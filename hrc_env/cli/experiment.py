@@ -21,13 +21,13 @@ class AnyExperiment(EngineArguments):
 
     name: ClassVar[str]
     out: Path
-    """Folder for report.html, results.json and figures. A run that was stopped continues there."""
+    """Folder for report.html, results.json and figures. A stopped run resumes from its folder."""
     quick: bool = False
-    """Compute the results from fewer seeds."""
+    """Reduce the number of seeds or episodes, for a preview of the results."""
     seeds: int | None = None
     """Number of seeds."""
     overwrite: bool = False
-    """Delete results of another run or of other settings in the folder."""
+    """Delete results in the folder that belong to another run or to other settings."""
 
     def run(self) -> int:
         """Run the experiment and print its tables; return the exit status."""
@@ -45,19 +45,19 @@ class AnyExperiment(EngineArguments):
 
 @dataclass(frozen=True)
 class SiteExperiment(AnyExperiment):
-    """Run the paper's simulation: a walk over the site, tracked by single cameras and by four."""
+    """Run the paper's simulation: a walk over the site, tracked by each camera and by all four."""
 
     name = "site"
     out: Path = Path("out/site")
     seeds: int | None = None
     """Number of walks (default: 9, quick: 2)."""
     estimator: tuple[str, ...] = ("particle", "paper")
-    """Estimators to compare; python -m hrc_env list shows their names."""
+    """Names of the estimators to compare; python -m hrc_env list shows them."""
 
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
-    """Run the paper's laboratory: all joints in six kinds of motion, by one camera and by four."""
+    """Run the paper's laboratory experiment: all joints in six motions, one camera or four."""
 
     name = "lab"
     out: Path = Path("out/lab")
@@ -98,7 +98,7 @@ class ImpactExperiment(AnyExperiment):
 class PriceExperiment(AnyExperiment):
     """Measure the cost of perception at an equal rate of contacts.
 
-    Each perception setup gets the safety margin at which it reaches that rate.
+    The safety margin of each perception setup is chosen so that the setup reaches that rate.
     """
 
     name = "price"
@@ -106,14 +106,15 @@ class PriceExperiment(AnyExperiment):
     task: str = DEFAULT
     """Id of the environment."""
     seeds: int | None = None
-    """Number of episodes per step of the search for a margin (default: 300). Each margin found is
-    confirmed by 10 episodes for every 3 of these (default: 1000; quick: 600)."""
+    """Number of episodes per step of the search for a margin (default: 300). The resulting margin
+    is confirmed by 10 new episodes for every 3 of these (default: 1000; quick: 600)."""
     eyes: tuple[str, ...] = ()
-    """Names of the perception setups to compare, as truth particle one_camera (default: all; quick:
-    12)."""
+    """Names of the perception setups to compare, for example truth particle one_camera (default:
+    all; quick: 12)."""
     robots: tuple[str, ...] = ()
     """Agent that controls the robots (default: scripted): random, scripted_slowed, hrc://ID/NAME, a
-    file (.zip, .safetensors) or MODULE:FUNCTION, as in play. Other tasks are then left out."""
+    file (.zip, .safetensors) or MODULE:FUNCTION, as in play. If an agent is given, only one task is
+    played."""
     control: str | None = None
     """Control mode of the agent if its file does not name one: joint (default), tool or twist."""
     trust: bool = False
@@ -145,8 +146,8 @@ class Experiment:
     The paper's two experiments are site and lab; impact measures the effect of perception on
     safety, price the cost of perception at an equal rate of contacts, and ablations compares rigs
     and estimators. Each accepts --quick, which takes minutes, and --out DIR, the folder for
-    report.html, results.json and figures. If a run is stopped, its finished parts are kept, and the
-    same command continues it.
+    report.html, results.json and figures. If a run is stopped, the same command resumes it from the
+    cached results of its completed parts.
     """
 
     experiment: (

@@ -14,7 +14,7 @@ from hrc_env.core.errors import ConfigError
 
 @dataclass(frozen=True)
 class Export(ExportRequest):
-    """Write a run's policy as a file that executes no code, and a model card with its scores."""
+    """Export a run's policy and a model card with its scores; loading the file executes no code."""
 
     run_folder: Annotated[Path, tyro.conf.Positional]
 

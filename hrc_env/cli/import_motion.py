@@ -22,11 +22,11 @@ if TYPE_CHECKING:  # --help imports no simulator
     from hrc_env.motion.clip import Clip
 
 USUAL_FPS = 60.0
-"""Frame rate to which faster recordings are resampled [1/s]; a step then has about 30 frames."""
+"""Frame rate to which faster recordings are resampled [1/s]; a walking step has about 30 frames."""
 TILE = (300, 400)
 N_MOMENTS, COLUMNS = 12, 6
 STAGE_M = (0.9, 0.3)
-"""Horizontal position to which the worker is moved in every picture of the film strip [m]."""
+"""Horizontal position x, y at which the worker is shown in every picture of the film strip [m]."""
 EYE_M = (1.4, -1.7, 1.35)
 """Position of the camera: x and y relative to the worker, z above the floor [m]."""
 TARGET_Z_M = 0.95
@@ -49,16 +49,17 @@ class ImportMotion:
     """Recording: .bvh, .amc (with its .asf in the same folder), or .npz with joints (T, 15, 3) and
     fps."""
     out: Path
-    """Clip to write (.npz); an interrupted run leaves no partial file."""
+    """File (.npz) to which the clip is written; an interrupted run leaves no partial file."""
     fps: float | None = None
     """Frame rate of the clip [1/s] (default: that of the recording, at most 60)."""
     source_fps: float | None = None
-    """True frame rate of the recording [1/s], if its file contains none (AMC) or a wrong one."""
+    """True frame rate of the recording [1/s], for files without a frame rate (AMC) or with a wrong
+    one."""
     skeleton: Path | None = None
-    """The .asf file of an .amc file, if it is not in the same folder."""
+    """Skeleton file (.asf) of an .amc recording, if it is not in the same folder."""
     joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Joint with an unknown name in the file, as left_shoulder=lShldr, or a TOML file with such
-    lines. The option may be repeated."""
+    """Assignment of a joint to its name in the file if that name is not recognized, such as
+    left_shoulder=lShldr; or a TOML file with such lines. The option may be repeated."""
     up: str | None = None
     """Upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False
@@ -66,9 +67,10 @@ class ImportMotion:
     for long, or above the floor because the right .asf file is missing. The clip is played as if
     the floor were level."""
     worker: str = "worker_1"
-    """Name of the body to fit. Others can play the clip, too, scaled to their legs and arms."""
+    """Name of the body model to which the recording is fitted. Workers with other bodies can also
+    play the clip, scaled to the lengths of their legs and arms."""
     picture: Path | None = None
-    """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
+    """PNG file to which a film strip of the clip is also drawn (needs OpenGL)."""
 
     def run(self) -> int:
         """Read and fit the recording, print the errors and write the clip; return the status."""
@@ -126,7 +128,7 @@ def print_capture(console: Console, capture: "Capture") -> None:
 
 
 def print_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
-    """Print each joint's name in the file and its distance between worker and recorded person."""
+    """Print each joint's name in the file and its distance between the fit and the recording."""
     table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
     joints = zip(JOINTS, capture.node_names, 100 * error.mean_m, 100 * error.p95_m, strict=True)
     for joint, name, mean_cm, p95_cm in joints:
@@ -146,7 +148,7 @@ def print_error(console: Console, capture: "Capture", clip: "Clip", error: "Reta
 
 
 def _draw_film_strip(clip: "Clip", worker: str) -> "Image":
-    """Return one picture of a clip's poses at equal intervals, each labelled with its time."""
+    """Return an image of a clip's poses at equal time intervals, each labelled with its time."""
     import numpy as np  # here: --help imports no simulator
 
     from hrc_env.core.records import WorkerMotion

@@ -1,4 +1,4 @@
-"""List the names that arguments take, or print the configuration that arguments describe."""
+"""List the valid names for arguments, or print the configuration that arguments describe."""
 
 from dataclasses import asdict, dataclass
 
@@ -11,10 +11,7 @@ from hrc_env.env_words import EnvironmentArguments
 
 @dataclass(frozen=True, kw_only=True)
 class List(EnvironmentArguments):
-    """List the valid names of arguments: tasks, perception levels, robots, agents and others.
-
-    With --config, print every setting of the environment that the arguments describe, as TOML.
-    """
+    """List the valid names for arguments: tasks, perception levels, robots, agents and others."""
 
     config: tuple[str, ...] | None = None  # type: ignore[assignment]
     """Print the configuration with these changes, if any: FIELD=VALUE or a .toml file."""

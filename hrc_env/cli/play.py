@@ -33,7 +33,7 @@ class Play(EnvironmentArguments):
     """Agent: a name (random, scripted, scripted_slowed, hrc://ID/NAME; see python -m hrc_env list);
     a file (a checkpoint of `train` or Stable-Baselines3, .zip, or a policy of `export`,
     .safetensors); or MODULE:FUNCTION, a function that takes an EnvInfo and returns an object with
-    act(observation). Files written by this package contain their --control."""
+    act(observation). Files written by this package contain the control mode."""
     trust: bool = False
     """Allow pickles in a checkpoint of Stable-Baselines3, which can run arbitrary code, to be
     loaded: needed for custom policy or network classes, and for statistics of VecNormalize."""
@@ -42,7 +42,8 @@ class Play(EnvironmentArguments):
     seed: int = 0
     """Seed of the first episode; it increases by one with each further episode."""
     video: Path | None = None
-    """Film the first episode, write it to this .mp4 file, and play no further episodes."""
+    """File (.mp4) to which a film of the first episode is written; no further episodes are
+    played."""
     viewer: bool = False
     """Show the scene in MuJoCo's interactive viewer (needs a display)."""
 
@@ -93,10 +94,11 @@ class Play(EnvironmentArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(EnvironmentArguments):
-    """Film a scripted robot that detects a person in rendered images and slows down nearby."""
+    """Film a scripted robot that detects a person in rendered images and slows down near them."""
 
     out: Path = Path("out/demo.mp4")
-    """Film to write (.mp4); a still image (.png) is written to the same folder."""
+    """File (.mp4) to which the film is written; a still image (.png) is written to the same
+    folder."""
     seed: int = 7
     """Seed of the episode."""
     seconds: float = 10.0

@@ -20,7 +20,7 @@ class Setup:
     detector.network."""
 
     def run(self) -> int:
-        """Carry out the setup and return 0, even without OpenGL, which only pictures need."""
+        """Carry out the setup and return 0, even without OpenGL, which only images require."""
         console = Console()
         fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
         ready, message = find_opengl(console)

@@ -1,7 +1,7 @@
 """Access to the rows of records of arrays whose first axis is the environment.
 
-A component that processes only some environments (a reset of 3 of 64) operates on a record of their
-rows. Since no result depends on the batch size, the computation is the same.
+A component that processes only some environments, such as the 3 of 64 that are reset, operates on a
+record of their rows. The computation is the same, because no result depends on the batch size.
 """
 
 import copy
@@ -71,7 +71,7 @@ def copy_arrays(value: Any) -> Any:
 
 
 def flatten_axes(array: Floats, n_last: int) -> Floats:
-    """Return an array (..., *last) reshaped to (count, *last), contiguous.
+    """Return an array (..., *last) reshaped to (count, *last), in contiguous memory.
 
     `last` stands for the last `n_last` axes.
     """
@@ -85,10 +85,7 @@ def select_streams(streams: Sequence[np.random.Generator], ids: Ints) -> list[np
 
 
 class Stateful:
-    """Base of objects whose state can be saved and restored.
-
-    A subclass lists the attributes that change in `CHANGES`; all others are settings and constants.
-    """
+    """Base class of objects with a state that can be saved and restored."""
 
     CHANGES: ClassVar[tuple[str, ...]] = ()
 

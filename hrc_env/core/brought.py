@@ -70,7 +70,7 @@ def function_called(what: str, name: str, meaning: str) -> Any:
         ConfigError: there is no such function.
     """
     module, _, function = name.partition(":")
-    if os.getcwd() not in sys.path:  # as `python -m` has it
+    if os.getcwd() not in sys.path:  # as with `python -m`
         sys.path.append(os.getcwd())
     try:
         found = getattr(import_module(module), function)
@@ -100,7 +100,7 @@ def numbers_of(
     """
     try:
         array = np.asarray(value)
-    except (ValueError, TypeError) as error:  # lists of unlike lengths, broken __array__
+    except (ValueError, TypeError) as error:  # ragged lists, faulty __array__
         raise ConfigError(f"{what} must be an array, got {describe(value)}: {error}") from error
     if array.dtype.kind not in "fiub":
         raise ConfigError(
@@ -136,7 +136,7 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
 
 
 def points_of(what: str, value: object) -> NDArray[np.float64]:
-    """Return a value as at least one point, (N, 3), or raise `ConfigError`."""
+    """Return a value as an array (N, 3) of at least one point, or raise `ConfigError`."""
     return numbers_of(what, value, (count_of(value), 3), "points, xyz")
 
 

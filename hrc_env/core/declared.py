@@ -38,14 +38,14 @@ from numpy.typing import NDArray
 RowT = TypeVar("RowT", covariant=True)
 NewT = TypeVar("NewT")
 Selection: TypeAlias = slice | NDArray[Any] | list[int] | EllipsisType
-"""An index that selects rows and keeps their axis."""
+"""Index that selects rows and keeps their axis."""
 SCALARS: dict[Any, str] = {bool: "?", int: "i8", float: "f8"}
 """NumPy type codes of the fields that hold a single value."""
 
 
 @cache
 def dtype_of(declaration: type) -> np.dtype[Any]:
-    """Return the structured dtype of a declared record, its fields aligned as in C.
+    """Return the structured dtype of a declared record, with fields aligned as in C.
 
     Args:
         declaration: a class whose annotated attributes are the fields, in order: `bool`, `int` or

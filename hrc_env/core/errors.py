@@ -31,15 +31,18 @@ class ConfigError(HRCError, ValueError):
 
 
 class NoGoalError(ConfigError, AttributeError):
-    """A goal-based reward is requested for a task without goals; `hasattr` returns False."""
+    """A goal-based reward is requested for a task without goals.
+
+    It is an `AttributeError`, for which `hasattr` returns False.
+    """
 
 
 class NoAttributeError(ConfigError, AttributeError):
-    """An environment has no attribute of this name; `hasattr` returns False."""
+    """An environment has no attribute of this name; `hasattr` returns False for this error."""
 
 
 class DownloadError(HRCError, RuntimeError):
-    """A file cannot be downloaded, or its content is not the expected one."""
+    """A file cannot be downloaded or has unexpected content."""
 
 
 class WeightsError(DownloadError):
@@ -60,7 +63,7 @@ class MissingExtraError(HRCError, ImportError):
 
 @contextlib.contextmanager
 def learner() -> Generator[None]:
-    """Convert a failed import of a learning library into a `MissingExtraError` with the remedy."""
+    """Return a context that turns failed imports of a learning library into `MissingExtraError`."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -1,4 +1,7 @@
-"""Folders for files kept between runs, even if the home or package folder is read-only."""
+"""Writable folders for files that are kept between runs.
+
+They exist even if the home folder or the package's folder is read-only.
+"""
 
 import contextlib
 import hashlib
@@ -42,7 +45,7 @@ def temporary_cache() -> Path:
         if status.st_uid == owner and not status.st_mode & 0o022 and not folder.is_symlink():
             return folder
         name = hashlib.sha256(os.urandom(16)).hexdigest()[:12]
-        folder = folder.with_name(f"{folder.name}-{name}")  # another user took the first
+        folder = folder.with_name(f"{folder.name}-{name}")  # the first name is not safe
         folder.mkdir(mode=0o700)
     return folder
 
@@ -59,7 +62,7 @@ def can_write(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
-    """Hold the lock of a folder; `wait` is called if another process holds it."""
+    """Hold the lock of a folder in a context; call `wait` if another process holds the lock."""
     try:
         import fcntl
 

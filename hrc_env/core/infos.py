@@ -6,6 +6,7 @@ finite, another key states whether the number was measured. Names are encoded as
 `name_indices` decodes.
 """
 
+import difflib
 import fnmatch
 import re
 from collections.abc import Mapping, Sequence
@@ -20,9 +21,9 @@ from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
-"""Numbers (B,) by name; NaN where an environment has none in this step."""
+"""Numbers (B,) by name; NaN for environments in which a number does not exist in this step."""
 ABSENT = "absent"
-"""Activity and body of a worker that is not in the episode; its index is -1."""
+"""Name of the activity and of the body of a worker that is not in the episode; the index is -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
 CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 WORDS = {
@@ -31,9 +32,10 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Names in `OF_WORKERS` of the indices from which `name_indices` decodes each of its keys."""
+"""Keys that `name_indices` returns. The values are the names in `OF_WORKERS` of the indices that
+are decoded."""
 PEOPLE = ("activity", "body")
-"""Names of the words that every worker has."""
+"""Names in `OF_WORKERS` of the indices that every worker has."""
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
@@ -41,7 +43,7 @@ MORE_PEOPLE = "perception/more_people_than_slots"
 N_CAMERAS = "episode/n_cameras"
 MOVED, TURNED = "episode/max_camera_shift_m", "episode/max_camera_rotation_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
-"""Keys of the random draws of an episode."""
+"""Keys of properties that are sampled for each episode: delay, light, and the prefix for faults."""
 
 
 RENAMED = {
@@ -66,11 +68,24 @@ RENAMED = {
 
 
 class InfoDict(dict[str, Any]):
-    """Info of a reset or step, whose `KeyError` for a former key names the current key."""
+    """Info of a reset or step, with errors that name the right key for a former or misspelt one."""
 
     def __missing__(self, key: str) -> Any:
         """Raise a `KeyError` for a missing key."""
-        raise KeyError(_describe_renaming(key) if key in RENAMED else key)
+        if key in RENAMED:
+            raise KeyError(_describe_renaming(key))
+        near = difflib.get_close_matches(str(key), self, 1)
+        raise KeyError(f"{key}; did you mean {near[0]!r}?" if near else key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return the value of a key, or `default` for one that is missing.
+
+        Raises:
+            KeyError: the key is a former one.
+        """
+        if key in RENAMED and key not in self:
+            raise KeyError(_describe_renaming(key))
+        return super().get(key, default)
 
 
 def _describe_renaming(key: str) -> str:
@@ -296,7 +311,7 @@ ENTRIES: dict[str, Entry] = {
         "`pixels` and `keypoints`",
     ),
 }
-"""Descriptions of the numbers by key, except reward terms and the numbers of each worker and each
+"""Descriptions of the numbers by key, without reward terms and the numbers of each worker and
 camera."""
 OF_WORKERS: dict[str, str] = {
     "activity": "index of the activity of worker N; -1 if the worker is not in the episode",
@@ -305,14 +320,15 @@ OF_WORKERS: dict[str, str] = {
     "motion in the previous step: 0 towards the worker, 1 away, 2 neither; -1 if none begins",
     "contact_region": "index of the body region that this contact hits; -1 if there is none",
 }
-"""Meanings of the keys `worker_N/NAME` by NAME; N counts from 0."""
+"""Meanings of the infos of worker N, which have the keys `worker_N/NAME`, by NAME; N is the
+worker's index."""
 OWN = Entry("-", "", 0.0)
-"""Description of a number that a user's task or shield returns."""
+"""Description of a number that a user's custom task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
 """Prefixes of keys that always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")
-"""Prefixes of keys that concern the robot's belief."""
+"""Prefixes of keys of numbers that depend on the robot's belief."""
 
 
 @cache
@@ -341,7 +357,7 @@ def publish(info: Info) -> Info:
 
 
 def is_of_belief(name: str) -> bool:
-    """Return whether an info concerns the robot's belief; all others describe the truth."""
+    """Return whether an info depends on the robot's belief; all others describe the truth."""
     return name.startswith(OF_BELIEF)
 
 
@@ -372,7 +388,10 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
 
 
 def of_workers(**parts: Ints) -> Info:
-    """Return one info per worker and name, from indices (B, W) named as in `OF_WORKERS`."""
+    """Return one info per worker and name.
+
+    The arguments are indices (B, W), named as in `OF_WORKERS`.
+    """
     return {
         f"worker_{w}/{name}": part[:, w].astype(np.int64)
         for name, part in parts.items()

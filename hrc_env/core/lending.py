@@ -1,4 +1,7 @@
-"""Read-only views of arrays for users' functions, because other code uses the same arrays."""
+"""Read-only views of arrays for users' functions.
+
+Other code uses the same arrays, which a user's function must therefore not change.
+"""
 
 import functools
 from collections.abc import Callable, Collection

@@ -7,8 +7,8 @@ from pathlib import Path
 CGROUP = Path("/sys/fs/cgroup")
 """Folder with the resource limits of a container."""
 CORES = "HRC_ENV_CORES"
-"""Environment variable with the number of cores a process may use; `engines` sets it for
-workers."""
+"""Name of the environment variable that limits the number of cores of a process. The package
+`engines` sets it for workers."""
 
 
 def n_cores() -> int:

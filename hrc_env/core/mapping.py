@@ -1,4 +1,4 @@
-"""Conversion of settings from plain mappings or TOML files, and back."""
+"""Conversion between settings and plain mappings or TOML files."""
 
 import dataclasses
 import enum
@@ -20,8 +20,8 @@ from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy
 
 RecordT = TypeVar("RecordT")
 PRESETS: dict[Any, dict[str, Any]] = {}
-"""Named values of settings: for each type hint of a field, the values by the names that it
-accepts."""
+"""Named values of settings: for each type hint, a mapping from the accepted names to their
+values."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -51,7 +51,7 @@ def from_mapping(
     path: str = "",
     kinds: Mapping[str, type] | None = None,
 ) -> RecordT:
-    """Return a dataclass made from a mapping; nested ones may be mappings, tuples may be lists.
+    """Make a dataclass from a mapping; nested dataclasses may be mappings, and tuples may be lists.
 
     Args:
         kind: the dataclass.

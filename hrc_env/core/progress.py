@@ -57,7 +57,7 @@ class Meter:
         """Show the progress.
 
         Args:
-            done: completed amount, out of `total`.
+            done: amount of work completed, out of `total`.
             name: current activity; None keeps the previous one.
             note: a remark, such as the latest result.
         """
@@ -71,7 +71,7 @@ class Meter:
         self._bar.console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
     def _say(self) -> None:
-        """Print a line with the completed share, the count, and the elapsed and remaining time."""
+        """Print a line with the completed fraction, count, elapsed time and remaining time."""
         self._line_s, task = self._clock(), self._bar.tasks[0]
         passed_s, since = self._line_s - self._began_s, self.done - self._before
         left = _time(max(self.total - self.done, 0.0) / since * passed_s) if since > 0 else "?"
@@ -83,7 +83,7 @@ class Meter:
 
 @contextmanager
 def progress_bar(console: Console, name: str) -> Generator[Say]:
-    """Yield a function of (added share, current activity) that advances a progress bar."""
+    """Yield a callback, as described at `Say`, that advances a progress bar."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
 

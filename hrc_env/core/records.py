@@ -33,14 +33,14 @@ from hrc_env.core.typing import (
 
 @dataclass(frozen=True, slots=True)
 class Keypoints:
-    """Joints in the images, as a detector or its emulator reports them [px].
+    """Measurements of the joints in the images, made by a detector or its emulator.
 
     A joint that was not found has NaN coordinates and confidence 0; this is not an error.
     """
 
     px: Points2
-    """Positions of the joints (B, C, W, J, 2) [px], continuous from the image's top-left corner;
-    NaN where there is no measurement."""
+    """Image coordinates of the joints (B, C, W, J, 2) [px], continuous, with the origin at the
+    image's top-left corner; NaN where there is no measurement."""
     confidence: Floats
     """Confidence (B, C, W, J) in [0, 1]; 0 where there is no measurement."""
     sigma_px: Floats
@@ -56,9 +56,10 @@ class Roi:
     """A square region of one camera's image, rotated about its centre."""
 
     centre_px: tuple[float, float]
-    """Position of its centre, x and y [px] from the image's top-left corner."""
+    """Image coordinates x, y of the region's centre [px], relative to the image's top-left
+    corner."""
     side_px: float
-    """Length of its sides [px]."""
+    """Side length of the region [px]."""
     rotation_rad: float
     """Rotation of the region's upright direction, clockwise in the image [rad]; 0 is upright."""
 
@@ -75,8 +76,8 @@ class PoseEstimate:
     """Current names of renamed fields, by their old names."""
 
     mean_world: Points3
-    """Mean positions of the joints (B, W, J, 3) in the world frame [m]; without a track, those of
-    the documented prior."""
+    """Mean positions of the joints (B, W, J, 3) in the world frame [m]; for slots without a track,
+    the means of the prior."""
     cov_world: Covariances3
     """Covariance of each joint's position (B, W, J, 3, 3) [m^2], always finite and positive
     definite."""
@@ -85,21 +86,22 @@ class PoseEstimate:
     age_s: Floats
     """Time since each joint was last supported by a measurement (B, W, J) [s]."""
     tracked: Bools
-    """Whether each slot has a track (B, W); otherwise it has the prior, or a prediction that has
-    lasted too long (lost)."""
+    """Whether each slot has a track (B, W). A slot without a track has the prior, or a prediction
+    that is too old to count as a track."""
     unknown: Bools = None  # type: ignore[assignment]
-    """Whether a person without a track may be in the slot (B, W): lost, not searched for enough,
-    detected but not tracked, or on floor that no two cameras see (`tracking.presence`); True for
-    all slots while there are more people than slots. A slot that is neither tracked nor unknown is
-    empty. Default: every slot without a track is unknown."""
+    """Whether the slot may contain an untracked person (B, W), because a track was lost, the
+    searches do not suffice, a detected person is not tracked, or fewer than two cameras see part of
+    the floor (`tracking.presence`); True for all slots while there are more people than slots. A
+    slot that is neither tracked nor unknown is empty. Default: every slot without a track is
+    unknown."""
     unobserved_s: Floats = None  # type: ignore[assignment]
-    """Time since the cameras last observed the worker or saw that the slot is empty (B, W) [s];
-    without any observation, the time since the reset. Default: age of the joint with the most
+    """Time since the cameras last observed the worker, or observed that the slot is empty (B, W)
+    [s]; without any observation, the time since the reset. Default: age of the joint with the most
     recent measurement."""
     seen_world: Points3 = None  # type: ignore[assignment]
-    """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN without any
-    detection, or if that location was seen empty since. Default: the means of slots with a track,
-    otherwise NaN."""
+    """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN if there was no
+    detection, or if cameras have since observed that no person is at these positions. Default: the
+    means of slots with a track, otherwise NaN."""
 
     def __post_init__(self) -> None:
         try:
@@ -135,7 +137,10 @@ class WorkerPath:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Objects in the workers' hands, followed by L objects that lie ready; see `props.PROPS`."""
+    """Objects in the workers' hands, followed by L objects that are ready to be used.
+
+    `props.PROPS` lists the kinds of objects.
+    """
 
     kind: Ints
     """Kind of each object (B, W + L), as an index into `props.PROPS`; 0 for no object."""
@@ -158,15 +163,16 @@ class WorkerMotion:
     angular_velocity_world: Floats
     """Angular velocities of the segments in the world frame (B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """Objects that the workers hold and that lie ready for them; None if there are none."""
+    """Objects that the workers hold, and objects that are ready for them; None if there are
+    none."""
     body: Ints | None = None
-    """Index of each worker's body among the scene's bodies (B, W); None if all have the first
-    one."""
+    """Index of each worker's body in the scene's list of bodies (B, W); None if all workers have
+    the first body."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerTruth:
-    """The true workers; only emulators of detectors, cost and metrics read this record."""
+    """True state of the workers; only emulators of detectors, cost and metrics read this record."""
 
     joints_world: Points3
     """True positions of the joints (B, W, J, 3), defined as in BlazePose [m]."""
@@ -175,17 +181,17 @@ class WorkerTruth:
     capsules_world: Capsules
     """End points of the capsules of the bodies (B, W, K, 2, 3) [m]."""
     capsule_radius_m: Floats
-    """Radii of these capsules (B, W, K) [m]."""
+    """Radii of the capsules in `capsules_world` (B, W, K) [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """State of the robot from the robot's encoders: exact, hence neither belief nor truth."""
+    """State of the robot according to its encoders: exact, hence neither belief nor truth."""
 
     q: JointAngles
-    """Joint positions (B, N) [rad], of slides [m]."""
+    """Joint positions (B, N) [rad], or [m] for slides."""
     qd: JointVelocities
-    """Joint velocities (B, N) [rad/s], of slides [m/s]."""
+    """Joint velocities (B, N) [rad/s], or [m/s] for slides."""
     tool_world: Points3
     """Position of the tool point (B, 3) [m]."""
     tool_velocity_world: Velocities3
@@ -193,13 +199,13 @@ class RobotState:
     tool_axes_world: Floats
     """Axes x, y and z of the tool in the world frame, as columns (B, 3, 3)."""
     capsules_world: Capsules
-    """End points of the capsules of the robot and its loads (B, K, 2, 3) [m]; those of absent loads
-    are far away."""
+    """End points of the capsules of the robot and its loads (B, K, 2, 3) [m]; the capsules of
+    absent loads are far away."""
     capsule_radius_m: Floats
-    """Radii of these capsules (K,) [m]."""
+    """Radii of the capsules in `capsules_world` (K,) [m]."""
     slides: Bools | None = None
-    """Whether each joint is a slide (N,), with `q` in m and `qd` in m/s; None if there is no
-    slide."""
+    """Whether each joint is a slide (N,), with `q` in [m] and `qd` in [m/s]; None if there are no
+    slides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,10 +213,10 @@ class HandState:
     """State of the gripper from the robot's encoders."""
 
     opening_m: Floats
-    """Distance of each finger from the middle (B,) [m]."""
+    """Distance of each finger from the middle of the gripper (B,) [m]."""
     force_n: Floats
-    """Force with which the motor presses the fingers together (B,) [N]; negative if it opens
-    them."""
+    """Force with which the motor presses the fingers together (B,) [N]; negative if it opens the
+    gripper."""
     closed_on: Bools
     """Whether the fingers press and rest on an object (B,)."""
 

@@ -1,7 +1,7 @@
 """Registries of objects by name: those of the package and those that users register.
 
-A name that was registered in the parent process is available here, too; its object is unpickled on
-first use. A registration in this process replaces it.
+Registrations of the parent process are inherited; their objects are unpickled on first use. A
+registration of the same name in this process replaces an inherited one.
 """
 
 import threading
@@ -19,13 +19,13 @@ from hrc_env.core.snapshot import Entry, Snapshot
 
 ObjectT = TypeVar("ObjectT")
 FILES: dict[str, str] = {}
-"""Python files that this process imported, with the error message of each; "" if it had no
+"""Python files that this process imported, with their error messages; "" for a file without an
 error."""
 _LOCK = threading.RLock()
 _REGISTRIES: "dict[str, Registry[Any]]" = {}
 _IMPORTING: list[str] = []
-"""Files that are being imported, the innermost last; "" for a file that every child process imports
-by itself."""
+"""Stack of the files that are being imported, with the innermost last; "" stands for a file that
+every child process imports by itself."""
 
 
 class Registry(UserDict[str, ObjectT]):
@@ -35,12 +35,12 @@ class Registry(UserDict[str, ObjectT]):
         super().__init__(known or {})
         self.kind = kind
         self.own: dict[str, str | None] = {}
-        """Names that were registered in this process, with the file that registered each; None if
-        no file is known."""
+        """Names registered in this process, with the file that registered each name; None if the
+        file is unknown."""
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:
-        """Register an object, also for child processes; a name that is taken is a `ConfigError`."""
+        """Register an object, also for child processes; raise `ConfigError` if its name exists."""
         taken = name in self.data and (name in self.own or name not in self.inherited)
         if taken:
             raise ConfigError(f"The {self.kind} {name!r} exists already; choose another name.")

@@ -4,7 +4,7 @@ import os
 from tempfile import gettempdir
 
 VARIABLE = "HRC_ENV_REGISTERED"
-"""Environment variable with the files of this process, its parent, its grandparent and so on.
+"""Environment variable with the registration files of this process, its parent and so on.
 
 The paths are separated like the folders in PATH; the first existing file is used. See
 `core.snapshot`.
@@ -14,7 +14,7 @@ The paths are separated like the folders in PATH; the first existing file is use
 def reserve() -> str:
     """Reserve a file name for child processes, and return the inherited file, or "" for none.
 
-    Processes that are started before the first registration know the name, too.
+    Processes that are started before the first registration also know the name.
     """
     named = os.environ.get(VARIABLE, "")
     found = existing(named)

@@ -25,7 +25,7 @@ class Metric:
     """A number with its interval and sample size."""
 
     value: float
-    """Value of the metric: a mean, rate, share or median."""
+    """Value of the metric: a mean, rate, fraction or median."""
     low: float
     """Lower end of a 95 % interval, or the smallest of several runs."""
     high: float

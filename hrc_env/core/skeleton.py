@@ -1,8 +1,9 @@
 """The 15 joints, as inferred from figure 1 of the paper: names, pairs and bones.
 
 The paper uses 15 of BlazePose's 33 landmarks but does not name them. Joints are defined as in
-BlazePose (a "hip" is where BlazePose detects a hip), not as anatomical centres; the distances
-between the workers' true joints and the detector's are documented with the baked bodies.
+BlazePose (a "hip" is where BlazePose detects a hip), not as anatomical centres; the remaining
+distances between the workers' true joints and the detected ones are documented with the body
+models.
 """
 
 import numpy as np
@@ -24,10 +25,10 @@ N_JOINTS = len(JOINTS)
 JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 
 BLAZEPOSE_INDEX: Ints = np.array([0, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28, 31, 32])
-"""Index of each of `JOINTS` among BlazePose's 33 landmarks (31 and 32 are its foot tips)."""
+"""Index of each of `JOINTS` among BlazePose's 33 landmarks (31 and 32 are the tips of the feet)."""
 
 MIRROR: Ints = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13])
-"""Index of each joint's mirror image, with left and right exchanged."""
+"""Index of the joint that corresponds to each joint on the opposite side of the body."""
 
 TORSO: Ints = np.array([1, 2, 7, 8])
 """Indices of the shoulders and hips, whose mean is the root of the body."""
@@ -45,10 +46,10 @@ BONES: Ints = np.array(
 BONE_LENGTH_M: Floats = np.array(
     [.34, .20, .55, .55, .28, .26, .28, .26, .37, .40, .20, .37, .40, .20, .28, .28]
 )  # fmt: skip
-"""Bone lengths of an adult of unknown stature [m], with a standard deviation of about 10 %: the
-mean over the baked bodies, whose joints are where BlazePose puts them (its hips are higher and its
-toes farther out than the anatomical ones). Trackers that learn bone lengths refine them for each
-worker."""
+"""Bone lengths of an adult of unknown stature [m], with a standard deviation of about 10 %. They
+are means over the workers' body models, with joints as BlazePose locates them: the hips are higher
+and the toes farther out than the anatomical ones. Trackers that learn bone lengths refine them for
+each worker."""
 
 SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
     ((0,), (0,), 0.13),  # head, a sphere around the nose that includes the hat's front
@@ -61,15 +62,15 @@ SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
     ((9,), (11,), 0.065), ((10,), (12,), 0.065),  # shanks
     ((11,), (13,), 0.055), ((12,), (14,), 0.055),  # feet
 )  # fmt: skip
-"""Body segments defined by joints alone: the joints whose mean is the first end, those whose mean
-is the second end, and the radius [m]."""
+"""Body segments that are computed from joints alone: indices of the joints that are averaged for
+the first end, indices of those that are averaged for the second end, and the radius [m]."""
 
 HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
     (3, 5, 0.18, 0.05),
     (4, 6, 0.18, 0.05),
 )
-"""Hands, which are not among the 15 joints: elbow, wrist, length beyond the wrist [m], radius
-[m]."""
+"""Hands, which are not among the 15 joints: indices of elbow and wrist, length beyond the wrist
+[m], and radius [m]."""
 
 
 SEGMENT_RADIUS_M: Floats = np.array(

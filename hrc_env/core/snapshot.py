@@ -24,14 +24,14 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Form in which a registered object reaches another process: a pickle, a file, or neither."""
+    """Form in which child processes receive a registered object: a pickle, a file, or neither."""
 
     pickled: bytes = b""
     """The object, pickled by value; empty if it was not pickled."""
     file: str = ""
     """Python file that registers the object; empty for none."""
     refused: str = ""
-    """Error raised when the object was pickled; empty for none."""
+    """Message of the error that occurred when the object was pickled; empty for none."""
     max_episode_steps: int = 0
     """Time limit of a task [control steps]; 0 for other objects."""
 
@@ -45,7 +45,7 @@ class Snapshot:
     )
     """Entries by kind (such as "robot") and name."""
     files: tuple[str, ...] = ()
-    """Python files to import, in this order."""
+    """Python files to import, in the order of this sequence."""
 
 
 @dataclass(slots=True)
@@ -59,7 +59,7 @@ class _State:
     path: str
     """Path of the file of this process."""
     written: Snapshot | None = None
-    """Content of that file; None if it was not written."""
+    """Content of the file at `path`; None if it was not written."""
     seen: tuple[int, int] = (0, 0)
     """Inode and modification time of the inherited file when it was last read."""
     inherited: Snapshot = Snapshot()
@@ -122,7 +122,7 @@ def _is_private(folder: Path) -> bool:
 def _read(source: str) -> None:
     try:
         about = os.stat(source)
-    except OSError:  # no longer there
+    except OSError:  # the file no longer exists
         return
     seen = (about.st_ino, about.st_mtime_ns)
     if seen == _STATE.seen:
@@ -148,7 +148,7 @@ def _warn(said: str) -> None:
 
 
 def _begun() -> _State:
-    """Return the initial state, at import."""
+    """Return the state of this module at import."""
     reserve()
     own, _, others = os.environ[VARIABLE].partition(os.pathsep)
     return _State(others, os.getpid(), own)

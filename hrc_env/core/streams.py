@@ -1,4 +1,7 @@
-"""Fast derivation of random generators from other ones; an episode needs five."""
+"""Fast derivation of random generators from other generators.
+
+Every episode needs five generators.
+"""
 
 import functools
 from typing import Any
@@ -12,11 +15,7 @@ WORDS = 4
 
 
 class _Words(ISpawnableSeedSequence):
-    """A seed of random words, which are used without hashing.
-
-    Hashing them with `SeedSequence` would take five times as long as everything else. The class has
-    the attributes of a `SeedSequence`, from which other streams are derived (`appearance`).
-    """
+    """A seed that consists of random words, which are used without hashing."""
 
     spawn_key = ()
 
@@ -25,11 +24,11 @@ class _Words(ISpawnableSeedSequence):
 
     @property
     def entropy(self) -> list[int]:
-        """The words in the form that `SeedSequence` accepts."""
+        """The words, in the form that `SeedSequence` accepts."""
         return self.words.tolist()
 
     def generate_state(self, n_words: int, dtype: Any = np.uint64) -> NDArray[Any]:
-        """Return the words unchanged for the type of generator for which they were drawn."""
+        """Return the words unchanged, for the type of generator for which they were generated."""
         if n_words == WORDS and np.dtype(dtype) == np.uint64:
             return self.words
         return self._sequence.generate_state(n_words, dtype)
@@ -48,7 +47,7 @@ def aside(rng: np.random.Generator, number: int) -> np.random.Generator:
 
     Args:
         rng: the generator, which is not changed.
-        number: number of the purpose, unique and far above the number of children.
+        number: number that identifies the purpose, unique and far above the number of children.
     """
     seeds: Any = rng.bit_generator.seed_seq
     key = (*seeds.spawn_key, number)

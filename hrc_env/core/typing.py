@@ -15,7 +15,7 @@ Floats: TypeAlias = NDArray[np.float64]
 Bools: TypeAlias = NDArray[np.bool_]
 Ints: TypeAlias = NDArray[np.int64]
 Records: TypeAlias = NDArray[Any]
-"""A structured array, whose rows have named fields; its dtype describes them."""
+"""A structured array. Its rows have named fields, which its dtype describes."""
 
 Points2: TypeAlias = Annotated[Floats, "(..., 2) [px]"]
 Points3: TypeAlias = Annotated[Floats, "(..., 3) [m]"]

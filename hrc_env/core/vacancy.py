@@ -1,4 +1,4 @@
-"""Floor on which undetected people may be, and people in excess of the slots for workers."""
+"""Patches of floor where undetected people may be, and people in excess of the workers' slots."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ import numpy as np
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 
 POSSIBLE, PROBABLY_EMPTY, EMPTY = 0, 1, 2
-"""States of a patch of floor: a person may be there, a single camera has seen it empty, or several
-cameras have."""
+"""States of a patch of floor: a person may be there, one camera has observed that it is empty, or
+several cameras have."""
 STATURE_M = 1.8
 """Height of the space above a patch of floor that a person may occupy [m]."""
 WALKING_M_S = 1.6
@@ -24,13 +24,13 @@ class Coverage:
     piece_m: float
     """Distance from the centre of a patch to its corners [m]."""
     group: Ints
-    """Row of `cameras` that applies to each patch (N,)."""
+    """Index of the row of `cameras` that applies to each patch (N,)."""
     cameras: Bools
-    """Sets of cameras that occur, as masks (G, C)."""
+    """Set of cameras that see the patches of each group, as masks (G, C)."""
 
 
 MOST_OTHERS = 4
-"""Maximum number of people in excess of the workers' slots that are remembered."""
+"""Maximum number of people in excess of the workers' slots that are stored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +38,9 @@ class Others:
     """Detected people in excess of the workers' slots."""
 
     hips_world: Points3
-    """Last detected positions of their hips (B, N, 3) [m]; NaN in unused rows."""
+    """Last detected hip positions of the people (B, N, 3) [m]; NaN in unused rows."""
     age_s: Floats
-    """Time since they were detected (B, N) [s]; infinite in unused rows."""
+    """Time since the people were last detected (B, N) [s]; infinite in unused rows."""
 
     @property
     def any(self) -> Bools:
@@ -59,8 +59,9 @@ class Vacancy:
 
     coverage: Coverage
     level: Ints
-    """State of each group of a `Coverage` (B, W, G): `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    """State of each group of patches of a `Coverage` (B, W, G): `POSSIBLE`, `PROBABLY_EMPTY` or
+    `EMPTY`."""
     age_s: Floats
-    """Age of the oldest frame on which these states are based (B, W) [s]."""
+    """Age of the oldest frame on which `level` is based (B, W) [s]."""
     others: Others
     """Detected people in excess of the slots."""

@@ -24,11 +24,11 @@ except ModuleNotFoundError as missing:
 
 VERSION = version("hrc_env")
 START_S = "300"
-"""Greatest time that a machine under load may take to start Ray [s]; the default of Ray is 30."""
+"""Maximum time that a machine under load may take to start Ray [s]; Ray's default is 30 s."""
 ANSWER_S = 10.0
-"""Greatest time that a cluster may take to answer [s]."""
+"""Maximum time that a cluster may take to answer [s]."""
 STORE_BYTES = 500_000_000
-"""Size of the shared memory of a cluster that is started on this machine [bytes]."""
+"""Size of the shared memory of a cluster that this process starts [bytes]."""
 Note = Callable[[str], None]
 """Callback that receives a message for the user."""
 
@@ -50,7 +50,8 @@ def connected(
 
     Args:
         address: address of a cluster: "auto" on one of its machines, "HOST:6379", or
-            "ray://HOST:10001"; None: a cluster is started on this machine and stopped at the end.
+            "ray://HOST:10001"; None: a cluster on this machine, which is started here and stopped
+            at the end.
         note: callback that receives messages about the cluster.
         dashboard: whether a cluster started on this machine runs Ray's dashboard.
 
@@ -128,7 +129,7 @@ def list_machines() -> list[Machine]:
 
 
 def share_of(workers: int, machines: list[Machine], note: Note = print) -> float:
-    """Return the share of a core to reserve for each worker, so that all workers fit.
+    """Return the fraction of a core to reserve for each worker so that all workers fit.
 
     Args:
         workers: number of workers.
@@ -150,7 +151,8 @@ def check_machines(
 
     Args:
         machines: machines of the cluster.
-        works: check to run on each machine; it raises an `HRCError` that names what is missing.
+        works: check to run on each machine; it raises an `HRCError` that names the missing
+            requirement.
         note: callback that receives the addresses of machines that are still compiling.
 
     Raises:

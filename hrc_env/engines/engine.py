@@ -8,13 +8,16 @@ from typing import Any, Protocol
 from hrc_env.core.errors import ConfigError, check_integer, check_names
 
 Tick = Callable[[float], None]
-"""Callback that receives the increase of the completed share of a call."""
+"""Callback that receives the increase of the completed fraction of a call."""
 Call = Callable[[Tick], Any]
-"""Function of a `Tick`; its result does not depend on the process that computes it."""
+"""Function that takes a `Tick`. Its result does not depend on the process that computes it."""
 ENGINES = ("serial", "processes", "ray")
-"""Names of engines. `serial` computes calls one after the other in this process, whose environments
-share all cores; `processes` computes as many calls in parallel as there are cores, each on one
-thread; `ray` computes them as tasks of a Ray cluster."""
+"""Names of engines.
+
+`serial` computes calls one after the other in this process, in which environments use all cores.
+`processes` computes as many calls in parallel as there are cores, each on one thread. `ray`
+computes them as tasks of a Ray cluster.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,7 @@ class Engine(Protocol):
         ...
 
     def opened(self) -> AbstractContextManager[object]:
-        """Return a context in which successive runs use the same workers, if the engine can."""
+        """Return a context in which successive runs share their workers, if the engine has any."""
         ...
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
@@ -46,7 +49,7 @@ class Engine(Protocol):
         Args:
             calls: functions of a `Tick`.
             tick: callback that receives the index of a call and the increase of its completed
-                share; for a call in another process, it is called only once, at the end.
+                fraction; for a call in another process, it is called only once, at the end.
 
         Raises:
             HRCError: a call raised it, or a worker died repeatedly.

@@ -17,7 +17,7 @@ from hrc_env.core.machine import CORES, n_cores
 from hrc_env.engines.engine import Call, Done
 
 ATTEMPTS = 3
-"""Greatest number of attempts to compute calls if processes die."""
+"""Maximum number of attempts to compute calls if processes die."""
 SINGLE = {CORES: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """Environment variables with which a process computes on one core."""
 
@@ -90,7 +90,7 @@ class Processes:
 
 
 def end_with_parent() -> None:
-    """Start a thread that ends this process when its parent process ends, even if killed."""
+    """Start a thread that ends this process when its parent ends, even if the parent is killed."""
     parent = multiprocessing.parent_process()
 
     def wait_for_end() -> None:

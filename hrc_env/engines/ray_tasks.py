@@ -19,7 +19,7 @@ from ray.exceptions import RayError, RayTaskError  # isort: skip
 class RayTasks:
     """Engine that computes each call as a Ray task on one core.
 
-    Ray restarts tasks whose worker or machine died.
+    Ray restarts a task if its worker or machine dies.
     """
 
     workers: int | None = None

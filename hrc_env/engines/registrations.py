@@ -15,7 +15,7 @@ from hrc_env.registration import IMPORT, adopt, import_files
 
 @dataclass(frozen=True, slots=True)
 class Registrations:
-    """Registrations and the contents of the Python files that make them."""
+    """Registrations, and the contents of the Python files in which objects are registered."""
 
     registered: Snapshot
     sources: Mapping[str, bytes]

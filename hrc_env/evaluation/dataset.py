@@ -1,9 +1,9 @@
 """Data sets of episodes in a folder, with one file of arrays per episode and a metadata file.
 
-`dataset.json` contains versions, command, arguments, configuration and cameras.
-`episode_00000.npz` and the following files contain the arrays; the names of those of belief and
-truth begin with "belief/" and "truth/". `load_episodes` reads a folder; `numpy.load` and
-`json.load` read its files.
+`dataset.json` contains versions, command, arguments, configuration and cameras. `episode_00000.npz`
+and the following files contain the arrays. The names of arrays that belong to the belief or the
+truth begin with "belief/" or "truth/". `load_episodes` reads a folder; its files can also be read
+with `numpy.load` and `json.load`.
 """
 
 import json
@@ -32,22 +32,23 @@ class Episode:
     """One recorded episode of T steps and T + 1 moments, the first of which is the reset.
 
     `belief` is the robot's estimate, and `truth` the simulator's state: an agent that learns from
-    `truth` uses information that no robot has. Positions are in the world frame [m].
+    `truth` uses information that is not available to a real robot. Positions are in the world frame
+    [m].
     """
 
     seed: int
-    """Seed of the `reset(seed=seed)` that begins the episode."""
+    """Seed with which the episode begins, as in `reset(seed=seed)`."""
     observations: NDArray[np.float32] | dict[str, NDArray[Any]]
-    """Observations (T + 1, n), or arrays by name if goals or images are separate; "image_<camera>"
-    is an array (T + 1, H, W, 3) of uint8."""
+    """Observations (T + 1, n), or a dictionary of arrays if goals or images are separate. Its array
+    "image_<camera>" has the shape (T + 1, H, W, 3) and the type uint8."""
     actions: NDArray[np.float32]
     """Actions (T, A) in [-1, 1]."""
     rewards: NDArray[np.float64]
     """Rewards (T,)."""
     terminations: NDArray[np.bool_]
-    """Mask (T,) of the step that ended the episode."""
+    """Mask (T,) of the step that ends the episode by termination."""
     truncations: NDArray[np.bool_]
-    """Mask (T,) of the step that reached the time limit."""
+    """Mask (T,) of the step that ends the episode by the time limit."""
     belief: Arrays
     """Infos (T + 1, ...) computed from the belief, by name, such as "reward/proximity" and
     "perception/...". If poses are recorded, it also contains "joints_world" (T + 1, W, J, 3) [m],
@@ -58,12 +59,12 @@ class Episode:
     "safety/..." and "is_success". If poses are recorded, it also contains "joints_world"
     (T + 1, W, J, 3) [m], which is NaN for absent workers, and the mask "present" (T + 1, W)."""
     keypoints: Keypoints | None = None
-    """Keypoints (T + 1, C, W, J) that the estimator received, in pixels of the projections `P`;
-    None if they were not recorded."""
+    """Keypoints (T + 1, C, W, J) that the estimator received [px], in the image coordinates of the
+    projections `P`; None if they were not recorded."""
     P: NDArray[np.float64] | None = None
-    """Projection matrices (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels,
-    if keypoints are recorded and rigs are drawn at random; NaN for missing cameras. If None, the
-    projections of all episodes are in `metadata["cameras"]`."""
+    """Projection matrices (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels;
+    NaN for missing cameras. They are given if keypoints are recorded and the rig is sampled in
+    every episode. If None, `metadata["cameras"]` contains the projections for all episodes."""
 
     def __len__(self) -> int:
         """Return the number of steps T."""
@@ -71,7 +72,7 @@ class Episode:
 
 
 class EpisodeSet(Sequence[Episode]):
-    """The episodes of a folder, each of which is read when it is indexed.
+    """The episodes of a folder. An episode is read from its file when it is indexed.
 
     Args:
         path: the folder.
@@ -158,7 +159,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def select_folder(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays with names "folder/...", by the rest of their names."""
+    """Return the arrays with names "folder/NAME", by NAME."""
     return {k[len(folder) + 1 :]: v for k, v in arrays.items() if k.startswith(f"{folder}/")}
 
 

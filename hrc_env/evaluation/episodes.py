@@ -41,19 +41,21 @@ class Score:
     episodes: int
     """Number of episodes."""
     success_rate: float
-    """Share of attempts that succeeded (`Task.achieved` and `Task.failed`)."""
+    """Fraction of attempts that succeeded (`Task.achieved` and `Task.failed`)."""
     is_success: float
-    """Share of episodes that end with an `info["is_success"]` of 1."""
+    """Fraction of episodes that end with an `info["is_success"]` of 1."""
     goals_per_minute: float
     """Goals reached per minute over all episodes [1/min]."""
     contacts_per_episode: float
-    """Mean number of contacts with the true worker; a lasting contact counts once."""
+    """Mean number of contacts with a true worker; a lasting contact counts once."""
     cost_per_episode: float
-    """Mean sum of `info["cost"]`, which is computed from the truth [control steps]."""
+    """Mean over episodes of the sum of `info["cost"]`, which is computed from the truth [control
+    steps]."""
     close_steps_per_episode: float
-    """Mean number of steps closer to the true worker than the proximity limit."""
+    """Mean number of steps in which the distance to the true worker is below the proximity
+    limit."""
     median_min_separation_m: float
-    """Median over episodes of the smallest distance to the true worker [m]."""
+    """Median over episodes of the smallest distance to a true worker [m]."""
     return_mean: float
     """Mean sum of rewards."""
 
@@ -78,12 +80,12 @@ def evaluate(
         engine: engine that plays the episodes, without effect on the score: "serial", "processes"
             or "ray" (the cluster to which this process is connected, or one on this machine); None:
             the fastest on this machine.
-        tick: callback that receives the share of the work completed since its last call.
+        tick: callback that receives the fraction of the work completed since its last call.
         trust: whether pickles in a checkpoint may be loaded, as in `make_agent`.
         kwargs: arguments of `HRCVectorEnv`, such as task, perception and estimator.
 
     Returns:
-        Score of all episodes together.
+        Means and rates over the episodes.
 
     Raises:
         ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
@@ -114,13 +116,15 @@ def evaluate_episodes(
         n_episodes: number of episodes.
         seed: seed of the first episode.
         engine: engine that plays the episodes, as in `evaluate`.
-        tick: callback that receives the share of the work completed since its last call.
+        tick: callback that receives the fraction of the work completed since its last call.
         trust: whether pickles in a checkpoint may be loaded.
         kwargs: arguments of the environment, as in `evaluate`.
 
     Returns:
-        One dictionary per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
-            `success`, `seconds` and the other `STATISTICS`.
+        One dictionary per episode: the return `r`, the length `l` [control steps] and `seconds`
+            [s]; `cost` and `cost_steps`, its part from steps near a worker [control steps];
+            `contacts`, and of these `contacts_towards`, `contacts_fleeing` and `contacts_standing`;
+            `goals_reached` and `goals_missed`; `success`; and `min_separation_m` [m].
 
     Raises:
         ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
@@ -159,7 +163,7 @@ def play_shards(
         seed: seed of the first episode.
         engine: engine that plays the shards; None: several processes at the level `pixels`,
             otherwise this process.
-        tick: callback that receives the share of the work completed since its last call.
+        tick: callback that receives the fraction of the work completed since its last call.
         kwargs: arguments of the environment, as in `play_episodes`.
     """
     is_drawn = kwargs.get("perception") == "pixels"
@@ -192,14 +196,14 @@ def play_episodes(
 ) -> list[dict[str, float]]:
     """Play whole episodes and return the statistics of each by name.
 
-    Episode k, from 0, begins with `reset(seed=seed + k)` for every agent, so that agents and
-    perception levels can be compared episode by episode.
+    Episode k, counted from 0, begins with `reset(seed=seed + k)`. Agents and perception levels can
+    therefore be compared episode by episode.
 
     Args:
         make: function that makes the agent for an `EnvInfo`.
         n_episodes: number of episodes.
         seed: seed of the first episode.
-        tick: callback that receives the share of the work completed since its last call.
+        tick: callback that receives the fraction of the work completed since its last call.
         kwargs: arguments of `HRCVectorEnv`; with perception="pixels", which is not batched, those
             of `gymnasium.make`.
     """
@@ -240,7 +244,7 @@ def play_one_by_one(
 
 
 def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
-    """Return the agent that a factory makes; raise `ConfigError` if a signature is wrong."""
+    """Return the agent that a factory makes; raise `ConfigError` if its signature is wrong."""
     check_arguments("The function that makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):
@@ -250,7 +254,7 @@ def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
 
 
 def _to_batch(step: Transition) -> dict[str, Any]:
-    """Return the info of a single environment as the info of a batch of one."""
+    """Return the infos of a step of a single environment as those of a batch of size one."""
     arrays = {name: np.array([value]) for name, value in step.info.items()}
     return arrays | {f"_{name}": np.ones(1, np.bool_) for name in arrays}
 
@@ -274,7 +278,7 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
 
 
 def describe_contradiction(score: Score) -> str:
-    """Return a warning if most attempts were achieved but no episode succeeded, otherwise ""."""
+    """Return a warning if most attempts succeeded but no episode did, otherwise ""."""
     if score.is_success > 0 or score.success_rate < 0.5:
         return ""
     return (

@@ -22,13 +22,14 @@ from hrc_env.pipeline.ready import make_ready
 from hrc_env.render.frame import MOMENT, Diary, compose
 
 STEPS_PER_FRAME = 2
-"""Control steps per film frame; the film runs in real time."""
+"""Number of control steps per film frame; the film runs in real time."""
 CLOSE_M = 0.1
-"""Greatest distance of a near miss [m]; the still shows the closest moment that is not one."""
+"""Distance up to which an approach counts as a near miss [m]. The still shows the closest moment
+that is not a near miss."""
 H264 = ("-preset", "superfast", "-crf", "18")
-"""Encoder options for sharp images, which take a fifth of the time of the usual preset."""
+"""Encoder options for sharp images; encoding takes a fifth of the time of the default preset."""
 FRAMES_BEHIND = 2
-"""Greatest number of frames that wait to be drawn."""
+"""Maximum number of frames that are queued for rendering."""
 
 
 class FilmResult(NamedTuple):
@@ -53,7 +54,7 @@ def film_episode(
         make: function that makes the agent for an `EnvInfo`.
         path: the .mp4 file to write.
         seed: seed of the episode.
-        n_steps: greatest number of control steps.
+        n_steps: maximum number of control steps.
         kwargs: arguments of `HRCEnv`.
     """
     level = kwargs.get("perception", "pixels")
@@ -77,8 +78,8 @@ def find_nearest_seed(
 ) -> int:
     """Return the seed of the episode in which the robot comes closest without a near miss.
 
-    No images are rendered: the level "pixels" is replaced by "keypoints", so that the episode in
-    the film may differ.
+    No images are rendered: the level "pixels" is replaced by "keypoints". The episode in the film
+    may therefore differ.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
@@ -89,7 +90,7 @@ def find_nearest_seed(
     free = [seed for seed, distance_m in closest_m.items() if distance_m > CLOSE_M]
     if free:
         return min(free, key=closest_m.__getitem__)
-    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least close
+    return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the most distant
 
 
 def begin_episode(env: Any, make: AgentFactory, seed: int, n_steps: int) -> Iterator[Transition]:
@@ -108,7 +109,7 @@ def _find_closest_m(env: HRCEnv, make: AgentFactory, seed: int, n_steps: int) ->
 
 
 def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) -> FilmResult:
-    """Play an episode while a thread draws and encodes every second step."""
+    """Film an episode; a thread draws and encodes every second step."""
     steps, waiting = begin_episode(env, make, seed, n_steps), deque[Future[Image]]()
     writer: Any = imageio.get_writer(
         path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME,

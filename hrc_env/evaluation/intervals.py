@@ -1,8 +1,9 @@
-"""Metrics with 95 % intervals, by bootstrap over seeds because frames of a seed are dependent.
+"""Metrics with 95 % intervals, computed by bootstrap over seeds.
 
-Rows that share their seeds are compared seed by seed (`compare_paired`). Rates of rare events and
-shares of trials have exact intervals (`estimate_rate`, `estimate_share`), because a bootstrap
-interval of zeros has no width, as if an event that was not observed were impossible.
+Seeds are resampled because the frames of one seed are dependent. Rows that share their seeds are
+compared seed by seed (`compare_paired`). Rates of rare events and fractions of trials have exact
+intervals (`estimate_rate`, `estimate_share`): if no event was observed, a bootstrap interval has
+zero width, as if the event were impossible.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,19 +23,19 @@ from hrc_env.evaluation.counts import Bins
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
-"""Function of the number of times (R, n) that each of n seeds is drawn in R bootstrap draws, which
-returns a value (R,) per draw."""
+"""Function that computes a statistic for R bootstrap resamples of n seeds. It maps weights (R, n),
+the number of times that each seed occurs in each resample, to values (R,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The difference between two rows."""
+    """The difference between two rows of results."""
 
     difference: Metric
-    """Difference with its 95 % interval."""
+    """The difference, with its 95 % interval."""
     p: float
-    """Two-sided p-value, the probability of a difference at least this large if there were none;
-    NaN if undefined."""
+    """Two-sided p-value: the probability of a difference at least as large as the observed one if
+    the rows do not differ; NaN if undefined."""
 
 
 def compare_means(ours: Numbers, theirs: Numbers, unit: str = "1") -> Comparison:
@@ -101,7 +102,7 @@ def compare_rates(
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
     """Return a statistic of n seeds with its 95 % percentile interval.
 
-    Draws for which the statistic is undefined are ignored.
+    Resamples for which the statistic is undefined are ignored.
     """
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
@@ -129,14 +130,14 @@ def compare_paired(
     Args:
         name: name of the statistic.
         statistic: statistic of one row, not of the difference. It takes weights (R, 2n), the number
-            of times that each seed counts, first for our row and then for theirs. For the statistic
-            of our row, the weights of theirs are 0.
+            of times that each seed counts, first for our row and then for the other. For the
+            statistic of our row, the weights of the other row are 0.
         n: number of seeds of a row.
         unit: unit of the statistic.
-        n_draws: number of draws of seeds.
+        n_draws: number of resamples.
 
     Returns:
-        "difference.NAME", with its 95 % interval over draws of whole pairs, and "p.NAME", the
+        "difference.NAME", with its 95 % interval over resamples of whole pairs, and "p.NAME", the
             two-sided p-value of a permutation test that swaps the rows of each pair at random
             (Fisher 1935), which can fall below .05 with 6 seeds or more.
     """
@@ -187,7 +188,7 @@ def make_binned_quantile(bins: Bins, counts: Any, q: float) -> Statistic:
 def estimate_ratio(above: Numbers, below: Numbers, unit: str) -> Metric:
     """Return the sum of one number per seed, divided by the sum of another, with its interval.
 
-    The result is a rate, a share or the ratio of two rows.
+    The result is a rate, a fraction or the ratio of two rows.
     """
     x, y = _keep_finite(above, below)
     return bootstrap(make_ratio(x, y), len(x), unit)
@@ -231,10 +232,10 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
 
 
 def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
-    """Return the share of trials with a true outcome, with its exact 95 % interval.
+    """Return the fraction of trials with a true outcome, with its exact 95 % interval.
 
     The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404). Without
-    trials, the share is NaN.
+    trials, the fraction is NaN.
 
     Args:
         outcomes: truth values (n,), one per trial.
@@ -256,16 +257,16 @@ def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
     """Return goals per minute with an interval.
 
     The interval is computed by bootstrap if any goal was reached, and is otherwise exact. Goals are
-    reached more regularly than events of a Poisson process occur, so that the bootstrap interval is
+    reached more regularly than the events of a Poisson process; the bootstrap interval is therefore
     narrower than the exact one.
     """
     return (estimate_ratio if np.any(goals) else estimate_rate)(goals, minutes, "1/min")
 
 
 def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
-    """Return the share of attempts that succeeded, with a bootstrap interval.
+    """Return the fraction of attempts that succeeded, with a bootstrap interval.
 
-    If all or none succeeded, the interval is the exact one of as many trials as there are seeds,
+    If all or none succeeded, the interval is the exact one for as many trials as there are seeds,
     because attempts with the same seed are dependent.
     """
     share = estimate_ratio(achieved, tries, "1")
@@ -278,7 +279,8 @@ def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
 def subtract_rates(ours: Metric, theirs: Metric) -> Metric:
     """Return the difference of two rates, with an interval computed from their intervals.
 
-    The interval (Zou and Donner 2008, doi:10.1002/sim.3095) has a width even if both rates are 0.
+    The interval (Zou and Donner 2008, doi:10.1002/sim.3095) has a width greater than zero even if
+    both rates are 0.
     """
     difference = ours.value - theirs.value
     low = difference - np.hypot(ours.value - ours.low, theirs.high - theirs.value)
@@ -361,7 +363,7 @@ def _check_column(name: str, values: Any) -> Floats:
 
 
 def _keep_finite(*samples: Numbers) -> list[Floats]:
-    """Return the samples without the seeds for which any of the numbers is not finite."""
+    """Return the samples without the seeds for which any sample is not finite."""
     arrays = [np.asarray(each, float) for each in samples]
     finite = np.all(np.isfinite(arrays), axis=0)
     return [each[finite] for each in arrays]
@@ -369,5 +371,8 @@ def _keep_finite(*samples: Numbers) -> list[Floats]:
 
 @lru_cache(maxsize=8)
 def draw_seeds(n: int, n_draws: int, stream: int = 0) -> Ints:
-    """Return the number of times (R, n) that each seed is drawn, reproducible for each stream."""
+    """Return bootstrap weights (R, n), the number of times that each seed occurs in each resample.
+
+    They are the same in every call with the same `stream`.
+    """
     return np.random.default_rng(stream).multinomial(n, np.full(n, 1 / n), n_draws)

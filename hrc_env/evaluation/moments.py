@@ -14,7 +14,8 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import worker_truth
 
 PROJECTIONS = "P"
-"""Name of the projection matrices, recorded with keypoints if every episode draws a new rig."""
+"""Name of the projection matrices, which are recorded with keypoints if the rig of cameras is
+sampled in every episode."""
 Moment = dict[str, NDArray[Any]]
 """Arrays (B, ...) by name; names from belief and truth begin with "belief/" and "truth/"."""
 

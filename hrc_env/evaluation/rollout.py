@@ -29,9 +29,9 @@ class Transition:
     reward: Any
     """Reward of the step, a number or (B,)."""
     terminated: Any
-    """Whether the step ended the episode, () or (B,)."""
+    """Whether the step ended the episode by termination, () or (B,)."""
     truncated: Any
-    """Whether the step reached the time limit, () or (B,)."""
+    """Whether the step ended the episode by the time limit, () or (B,)."""
     info: Mapping[str, Any]
     """Infos of the step (docs/reference/infos.md)."""
     is_playing: Bools
@@ -55,7 +55,7 @@ def rollout(
         env: a Gymnasium environment, a vector environment, or any object with their `step`.
         agent: the agent; its actions are passed to `env` unchanged.
         observation: the observation that `env.reset` returned.
-        n_steps: greatest number of steps (default: limited only by the environment).
+        n_steps: maximum number of steps (default: limited only by the environment).
 
     Yields:
         The transition of each step, as soon as the step is taken.

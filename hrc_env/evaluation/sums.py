@@ -14,7 +14,7 @@ COSTS = ("cost", "cost_proximity", "cost_contact")
 SUMS = np.dtype(
     [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
 )
-"""Data type of the sums over the current episode; a lasting contact counts once."""
+"""Data type of the sums over the current episode. A lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """Names of the statistics that count an episode's achieved and failed attempts (`Task.achieved`,
 `Task.failed`)."""

@@ -1,3 +1,3 @@
-"""Experiments that compare perception, estimators and policies on the ground truth."""
+"""Experiments that compare perception, estimators and policies with the ground truth."""
 
 from hrc_env.experiments import columns as columns

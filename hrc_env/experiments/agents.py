@@ -34,10 +34,10 @@ def get_agent_factory(agent: AgentChoice, trust: bool = False) -> AgentFactory:
 
 
 def describe_agent(agent: AgentChoice) -> Any:
-    """Return a JSON description of an agent for the keys of a study's parts.
+    """Return a description of an agent for the cache keys of a study's parts, as JSON values.
 
-    It is the agent's name, the digest of the agent's file, or, for a user's function, the name of
-    the function and the digest of its source file.
+    It is the agent's name or the digest of its file. For a user's function, it is the name of the
+    function and the digest of its source file.
     """
     if not isinstance(agent, str):
         name = getattr(agent, "__qualname__", type(agent).__qualname__)
@@ -52,7 +52,7 @@ def describe_agent(agent: AgentChoice) -> Any:
 
 
 def label_agents(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, str]:
-    """Return agents, in their order, by labels that are valid in names of files and results.
+    """Return agents, in the given order, by labels that are valid in names of files and results.
 
     Args:
         agents: agents as `hrc_env.make_agent` accepts them; repetitions count once.
@@ -74,7 +74,10 @@ def label_agents(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, s
 
 
 def label_agent(agent: str, taken: Mapping[str, str]) -> str:
-    """Return a label for a user's agent, in which - replaces all but letters, digits and _."""
+    """Return a label for a user's agent; it contains only letters, digits, _ and -.
+
+    All other characters are replaced by -.
+    """
     stem = agent.removesuffix(".zip").removesuffix(policies.SUFFIX)
     label = re.sub(r"\W+", "-", stem).strip("-")
     return f"own-{label}" if label in taken else label

@@ -1,4 +1,4 @@
-"""The folder of a study, with the finished parts from which a stopped run continues."""
+"""The folder of a study. It caches results of completed parts, from which a stopped run resumes."""
 
 import json
 import os
@@ -17,16 +17,16 @@ from hrc_env.engines.engine import Done, Engine
 from hrc_env.engines.local import Processes, Serial
 
 Progress = Callable[[float, str], None]
-"""Callback that receives the increase of the completed share and the label of the current part.
+"""Callback that receives the increase of the completed fraction and the label of the current part.
 
-Shares sum to 1.
+The increases sum to 1.
 """
 PartProgress = Callable[[float], None]
-"""Callback that receives the increase of the completed share of a part."""
+"""Callback that receives the increase of the completed fraction of a part."""
 LABEL = "experiment.json"
-"""Name of the file that identifies the study of a folder."""
+"""Name of the file that identifies the study to which a folder belongs."""
 _MAX_DIFFERENCES = 3
-"""Number of different settings that an error lists."""
+"""Maximum number of different settings that an error message lists."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,24 +36,23 @@ class Part:
     label: str
     """Name of the part and of its file."""
     make: Callable[[PartProgress], dict[str, Any]]
-    """Function that computes the part and reports its progress. For engines that use other
-    processes, it must be picklable."""
+    """Function that computes the part and reports its progress. It must be picklable for engines
+    that use other processes."""
     key: str | None = None
-    """Key of the part's inputs; None: the key of the cache."""
+    """Cache key of the part's inputs; None: the key of the cache."""
     notes: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that are stored with the part, if its label alone does not suffice to compute it
-    again."""
+    """Numbers that are stored with the part, if its label does not suffice to compute it again."""
     weight: float = 1.0
-    """Weight of the part in the progress; the weights of a study sum to its `n_parts`."""
+    """Weight of the part in the progress display. The weights of a study sum to its `n_parts`."""
 
 
 @dataclass(frozen=True, slots=True)
 class PartCache:
-    """Cache of finished parts, each of which is a JSON file with the key of its inputs."""
+    """Cache of completed parts. Each part is a JSON file that contains the key of its inputs."""
 
     folder: Path
     key: str
-    """Key of parts with a `Part.key` of None (`versions.make_key`)."""
+    """Key of the parts with a `Part.key` of None, as `versions.make_key` returns it."""
     n_parts: float
     """Total weight of the study's parts."""
     progress: Progress
@@ -78,14 +77,14 @@ class PartCache:
         return self._make_parts([Part(label, make, key, notes or {})], Serial())[0]
 
     def make_parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
-        """Return parts from their files, and compute the others by the engine.
+        """Return parts from their files, and compute missing ones by the engine.
 
         Each part is stored as soon as it is complete.
 
         Args:
             parts: parts that do not depend on each other.
-            one_core: whether the computation of a part uses only one core; if no engine is chosen,
-                several processes then compute the parts.
+            one_core: whether a part is computed on only one core; if no engine is chosen, several
+                processes then compute the parts.
         """
         engine = self.engine or (Processes() if one_core and n_cores() > 1 else Serial())
         return self._make_parts(parts, engine)
@@ -139,14 +138,14 @@ def claim_folder(
     """Mark `out` as the folder of a study.
 
     Args:
-        out: the folder. Finished parts of an earlier run with the same settings are kept.
+        out: the folder. Completed parts of an earlier run with the same settings are kept.
         name: name of the study.
         overwrite: whether to delete results of other studies or settings. Parts of the same study
             are kept, because each contains the key of its settings.
-        settings: all settings that the numbers depend on; None if unknown.
+        settings: all settings on which the numbers depend; None if unknown.
 
     Raises:
-        ConfigError: `out` is a file, or holds other results that may not be deleted.
+        ConfigError: `out` is a file, or contains other results that may not be deleted.
     """
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")
@@ -179,8 +178,8 @@ def release_folder(out: Path) -> None:
 def _normalize(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings as JSON stores them, without digests of source files.
 
-    After a change of code, a study can therefore continue in the same folder, and only the parts
-    that depend on the code are computed again.
+    A study can therefore continue in the same folder after a change of code; only the parts that
+    depend on the code are computed again.
     """
 
     def strip(value: Any) -> Any:

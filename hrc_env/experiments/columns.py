@@ -1,7 +1,8 @@
-"""Columns of tables: the metric of each row, its computation, and its format.
+"""Columns of tables, each with its metric, the computation of the metric, and its format.
 
-`mean("cost", "cost")` is the mean cost of a row's episodes, under the heading "cost", and has the
-name `ROW.cost` in results.json. All intervals are 95 % (`hrc_env.evaluation.intervals`).
+For example, `mean("cost", "cost")` is the mean cost of a row's episodes. Its heading is "cost", and
+its name in results.json is `ROW.cost`. All intervals are 95 % intervals
+(`hrc_env.evaluation.intervals`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,8 @@ Episodes = Sequence[Mapping[str, float]]
 Key = str | tuple[str, ...]
 """Key of a row, which replaces `{}`, or `{0}` and `{1}`, in the names of its metrics."""
 Measure = Callable[[Episodes, Episodes], Metric]
-"""Function that computes a metric from a row's episodes and its baseline's on the same seeds."""
+"""Function that computes a metric from the episodes of a row and of its baseline, which have the
+same seeds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,26 +31,26 @@ class Column:
     """A column of a table."""
 
     metric: str
-    """Name of the metric, with `{}` in place of the row's key, or `{0}` and `{1}` for its two
-    parts."""
+    """Name of the metric, with the placeholder `{}` for the row's key, or `{0}` and `{1}` for the
+    parts of the key."""
     heading: str = ""
     """Heading with the unit, as "cost [1/min]"; "" for a metric that only results.json contains."""
     digits: int = 1
     """Number of decimals."""
     scale: float = 1.0
-    """Factor from the metric's unit to the heading's."""
+    """Factor that converts the unit of the metric to that of the heading."""
     signed: bool = False
-    """Whether the metric is a difference, which is shown with its sign."""
+    """Whether the metric is a difference, which is always shown with a sign."""
     marked: bool = True
     """Whether a difference is marked with a dot if its interval excludes zero."""
     counted: bool = False
-    """Whether the metric counts rare events, so that its interval is always shown."""
+    """Whether the metric counts rare events. The interval of such a metric is always shown."""
     plain: bool = False
     """Whether the interval is never shown."""
     shows: Literal["value", "n", "count"] = "value"
-    """Number to show: the value, the number of observations, or a share in the form "8 of 9"."""
+    """Number to show: the value, the number of observations, or a fraction in the form "8 of 9"."""
     beside: str = ""
-    """Name of another metric; its value is shown in brackets instead of an interval."""
+    """Name of another metric, the value of which is shown in brackets instead of an interval."""
     measure: Measure | None = None
     """Function that computes the metric; None: the study or another column computes it."""
     is_paired: bool = False
@@ -106,12 +108,12 @@ def per_minute(
     unit: str | None = None,
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return a column with the sum of a statistic over episodes per minute of their duration.
+    """Return a column with the sum of a statistic over episodes, per minute of their duration.
 
     Args:
         statistic: one of `STATISTICS`. For the achievements of a task
             (`hrc_env.evaluation.sums.ACHIEVED`), the interval of a rate of zero is exact.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: `STATISTIC_per_minute`).
         unit: unit of the metric (default: that of the statistic, per minute).
         shown: fields of `Column`.
@@ -140,7 +142,7 @@ def rate(
 
     Args:
         statistics: one of `STATISTICS`, or several that are added.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: that of the first statistic).
         per: name of the exposure in `EXPOSURES`.
         shown: fields of `Column`.
@@ -171,15 +173,15 @@ EXPOSURES: dict[str, Exposure] = {
     "1000 episodes": Exposure("per 1000", lambda episodes: len(episodes) / 1000),
     "hour": Exposure("1/h", lambda episodes: _get_values(episodes, "seconds") / 3600),
 }
-"""Exposures of rare events by name."""
+"""Exposures for rates of rare events, by name."""
 
 
 def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown]) -> Column:
-    """Return a column with the share of episodes in which a statistic is not zero.
+    """Return a column with the fraction of episodes in which a statistic is not zero.
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
@@ -191,12 +193,12 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
 
 
 def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Shown]) -> Column:
-    """Return the column "success", the share of a task's attempts that succeeded.
+    """Return the column "success", the fraction of a task's attempts that succeeded.
 
     Args:
-        heading: heading of the column, as in `mean`.
-        clustered: whether attempts in one episode are dependent, so that the interval is computed
-            over episodes; otherwise every attempt counts as a trial.
+        heading: heading of the column; "" hides the column in tables.
+        clustered: whether attempts in one episode are dependent and the interval is computed over
+            episodes; otherwise every attempt counts as a trial.
         shown: fields of `Column`.
     """
 
@@ -212,11 +214,11 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
 def share_of_baseline(
     statistic: str, heading: str = "", name: str = "share", **shown: Unpack[Shown]
 ) -> Column:
-    """Return a column with a sum over episodes as a share of the baseline's on the same seeds.
+    """Return a column with a sum over episodes, divided by that of the baseline on the same seeds.
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric.
         shown: fields of `Column`.
     """
@@ -237,7 +239,7 @@ def difference_from_baseline(
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: heading of the column, as in `mean`.
+        heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: `difference.STATISTIC`).
         unit: unit of the metric.
         shown: fields of `Column`.

@@ -1,4 +1,4 @@
-"""The benchmark of policies: fixed conditions and seeds, and the entries of the leaderboard."""
+"""The benchmark of policies with fixed conditions and seeds, and the entries of the leaderboard."""
 
 import datetime
 import json
@@ -20,7 +20,7 @@ from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.task import find_task
 
 VERSION = 1
-"""Version of the conditions, seeds and counts: numbers of different versions are not comparable."""
+"""Version of the conditions, seeds and counts. Numbers of different versions cannot be compared."""
 SEED = 5_000_000
 """Seed of the first episode, far from those of training and of other evaluations."""
 SETUPS = {
@@ -29,7 +29,7 @@ SETUPS = {
     "late": ("four cameras, 200 ms late", PerceptionSetup(latency_s=0.2)),
     "one": ("one camera after 1 s", PerceptionSetup(n_cameras=1)),
 }
-"""Perception setups with their descriptions, by name; delayed images carry their time stamps."""
+"""Perception setups with their descriptions, by name. Delayed images carry time stamps."""
 COLUMNS = (
     per_minute(ACHIEVED, "goals per minute", name="goals_per_minute"),
     share_of_tries("success", digits=2),
@@ -52,12 +52,12 @@ are computed from the truth."""
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """The people, the perception and the shield of a row."""
+    """A condition of the benchmark: the people, the perception and the shield."""
 
     people: str = "unaware"
-    """Kind of people."""
+    """Kind of people, which determines how they react to the robot."""
     setup: str = "keypoints"
-    """Perception setup, a name in `SETUPS`."""
+    """Name of the perception setup in `SETUPS`."""
     shield: str | None = None
     """Name of the shield, or None for no shield."""
 
@@ -100,7 +100,7 @@ def make_study(
 
     Args:
         policy: the policy as `hrc_env.agents.registry.make_agent` accepts it.
-        ids: ids of environments; a learnt policy fits only one environment.
+        ids: ids of the environments; a learnt policy fits only one environment.
         control: control mode of the policy's actions; None: that of the policy's file, or joint
             velocities if the file contains none.
         n_seeds: number of episodes per row.
@@ -141,17 +141,17 @@ ENTRY_METRICS = {
     "towards_per_hour": "contacts towards per hour",
     "contacts_per_hour": "contacts per hour",
 }
-"""Metrics of each task and condition in an entry, with their headings on the leaderboard."""
+"""Metrics in an entry for each task and condition, with their headings on the leaderboard."""
 Scores = Mapping[str, Metric]
 """Metrics by name, as "ID.CONDITION.METRIC"."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """The entry of one policy on the leaderboard."""
+    """A policy's entry on the leaderboard."""
 
     policy: str
-    """Policy as the option `--policy` accepts it."""
+    """The policy, as the option `--policy` accepts it."""
     commit: str
     """Commit of the repository at which the policy was evaluated."""
     date: str
@@ -183,7 +183,7 @@ def read_entry(path: Path) -> Entry:
 
 
 def write_entry(path: Path, entry: Entry) -> None:
-    """Write an entry; an interrupted write leaves no partial file."""
+    """Write an entry atomically: an interrupted write leaves no partial file."""
     selected = {
         name: m for name, m in entry.scores.items() if name.rsplit(".", 1)[1] in ENTRY_METRICS
     }
@@ -194,7 +194,7 @@ def write_entry(path: Path, entry: Entry) -> None:
 
 
 def add_entry(path: Path, policy: str, results: Path) -> None:
-    """Write the entry of a policy to `path`, from the file results.json of its benchmark."""
+    """Write a policy's entry to `path`, based on the file results.json of its benchmark run."""
     content = json.loads(results.read_text())
     scores = {key: Metric(**value) for key, value in content["metrics"].items()}
     git, day = str(provenance()["git"]), datetime.date.today().isoformat()

@@ -1,4 +1,4 @@
-"""Functions that the figures of all studies share: style, error bars, axes and saving."""
+"""Functions for the figures of all studies: style, error bars, axes and saving."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from hrc_env.core.typing import Floats
 
 
 def make_figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure with a layout that adapts to its content."""
+    """Return an empty figure with a layout that adapts to its contents."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
@@ -39,7 +39,7 @@ def stamp(path: Path, text: str) -> None:
 
 
 def compute_error_bars(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
-    """Return the distances (2, n) of values from the lower and upper ends of their intervals."""
+    """Return the distances (2, n) from values to the lower and upper ends of their intervals."""
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
 
 

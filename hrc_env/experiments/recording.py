@@ -1,4 +1,4 @@
-"""Recordings of a worker beside a resting arm, on which every estimator can be replayed.
+"""Recordings of a worker beside a stationary arm, on which every estimator can be replayed.
 
 The detector's crops follow the estimator that runs during the recording, not those that are
 replayed.
@@ -44,7 +44,7 @@ class Recording:
     windows: tuple[Windows, ...]
     """Crop windows of the cameras, one per frame."""
     beliefs: PoseEstimate
-    """Estimates (T, 1, ...) of the estimator that was run during the recording."""
+    """Estimates (T, 1, ...) of the estimator that ran during the recording."""
 
 
 def record(
@@ -63,7 +63,7 @@ def record(
         config: the configuration of the environment.
         estimator: estimator whose predictions the crops follow.
         seed: seed of detector and estimator.
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     truth = worker_truth(load_bodies(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
@@ -95,8 +95,8 @@ def replay(
         recording: the recorded detections.
         estimator: name of the estimator.
         cameras: indices of the cameras.
-        n_start: number of frames at the start for which all cameras are used, so that every
-            estimator begins a track.
+        n_start: number of frames at the start for which all cameras are used, in which every
+            estimator can begin a track.
         seed: seed of the estimator.
     """
     P, keypoints = projections(recording.scene.cameras), recording.keypoints

@@ -51,9 +51,10 @@ class Table:
     """Text below the table. `{n[METRIC]}` is replaced by the number of observations of a metric,
     and `{NAME}` by one of `numbers`."""
     numbers: Mapping[str, Column] = field(default_factory=dict)
-    """Metrics that the note or sentences of the documentation contain, by name."""
+    """Columns with the numbers that the note, or sentences of the documentation, contain, by
+    name."""
     printed: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that other publications report, by the names of their metrics."""
+    """Values that other publications report, by the names of the corresponding metrics."""
 
     def check(self, known: Collection[str]) -> None:
         """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.
@@ -114,7 +115,7 @@ class Table:
         return self.note.format(n=n, **numbers)
 
     def to_markdown(self, metrics: Metrics, intervals: bool = True) -> str:
-        """Return the table in Markdown with its title and note, without rows that lack numbers.
+        """Return the table in Markdown with its title and note; rows without numbers are left out.
 
         Args:
             metrics: metrics by name.
@@ -145,12 +146,12 @@ class Report:
     question: str
     """The question and the method of the study."""
     parts: Sequence[str]
-    """Paragraphs, headings, tables and pictures as Markdown, in their order."""
+    """Paragraphs, headings, tables and pictures in their order, as Markdown."""
     spread: str = "95 % intervals over seeds"
-    """Description of the intervals of the numbers."""
+    """Description of the intervals in the report's tables."""
     quick: str = ""
-    """Warning that is shown below each table and on each figure of a quick run, in which
-    differences are not marked; "" for other runs."""
+    """Warning below each table and on each figure of a quick run, in which differences are not
+    marked; "" for other runs."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
@@ -186,7 +187,7 @@ def describe_quick_run(
     """Return the warning in the report of a quick run.
 
     Args:
-        n: greatest number of seeds or other repetitions.
+        n: maximum number of seeds or other repetitions.
         seconds: duration of a repetition [s], or (shortest, longest) if durations differ.
         unit: name of a repetition, in the singular.
         consequence: the conclusion that readers should draw.
@@ -199,11 +200,11 @@ def describe_quick_run(
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
 _TABLE = re.compile(r"^\|---", re.M)
 _DOT = " ●"
-"""Mark after a difference if its interval excludes zero."""
+"""Mark for a difference with an interval that excludes zero."""
 
 
 def _add_warning(part: str, words: str) -> str:
-    """Return a part of a report without marks and with a warning below its table or figure."""
+    """Return a part of a report without marks, and with a warning below its table or figure."""
     part = part.replace(_DOT, "")
     is_shown = _TABLE.search(part) or _FIGURE.search(part)
     return f"{part}\n\n*{words}*" if is_shown else part
@@ -314,6 +315,6 @@ def format_interval(value: float, low: float, high: float, digits: int, sign: st
 
 
 def _embed(out: Path, source: str) -> str:
-    """Return a picture's file as a data URI."""
+    """Return the file of a picture as a data URI."""
     data = base64.b64encode((out / source).read_bytes()).decode()
     return f"data:image/png;base64,{data}"

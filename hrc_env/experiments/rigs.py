@@ -1,7 +1,7 @@
-"""Choices of cameras, over which episodes rotate so that no result depends on one position.
+"""Choices of cameras, which successive episodes use in turn.
 
-In settings with fewer than four cameras, the others fail after a warm-up, so that every estimator
-begins a track.
+Results therefore do not depend on the position of one camera. In settings with fewer than four
+cameras, the others fail only after a warm-up, in which every estimator can begin a track.
 """
 
 from collections.abc import Sequence
@@ -13,27 +13,27 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 WARM_UP_S, DT_S = 1.0, HRCConfig().ctrl_dt
-"""Durations of the warm-up, in which all cameras still work, and of a control step [s]."""
+"""Durations of the warm-up, in which all cameras work, and of a control step [s]."""
 N_WARM_UP = round(WARM_UP_S / DT_S)
 """Number of control steps in the warm-up."""
 Rig = tuple[int, ...]
-"""Indices of cameras of a scene, from 0."""
+"""Indices of the cameras that belong to a rig, counted from 0 in their scene."""
 ALL: Rig = (0, 1, 2, 3)
 SINGLE: tuple[Rig, ...] = ((0,), (1,), (2,), (3,))
 NEIGHBOURS: tuple[Rig, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
 OPPOSITE: tuple[Rig, ...] = ((0, 2), (1, 3))
 TRIPLES: tuple[Rig, ...] = ((0, 1, 2), (1, 2, 3), (2, 3, 0), (3, 0, 1))
 MULTI = "multi"
-"""Name of all four cameras together in names of metrics."""
+"""Name of the rig of all four cameras in names of metrics."""
 CAMERA_LABELS = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
 """Labels of each single camera and of all four together, by their names in metrics."""
 CHOICES: dict[str, Rig] = dict(zip(CAMERA_LABELS, (*SINGLE, ALL), strict=True))
-"""Rigs of each single camera and of all four together, by their names in metrics."""
+"""Rigs of each single camera and of all four cameras, by their names in metrics."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Cameras and their faults in some of the episodes of a setting."""
+    """The cameras of some episodes of a setting, with their faults."""
 
     cameras: tuple[CameraConfig, ...] = ()
     """All cameras of the rig; if empty, those of the scene."""
@@ -48,7 +48,7 @@ def keep_cameras(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
 
 
 def make_turns(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:
-    """Return one turn per choice of the cameras of a scene that work after the warm-up."""
+    """Return one turn for each choice of the scene's cameras that work after the warm-up."""
     return tuple(keep_cameras(RIGS[scene], rig) for rig in rigs)
 
 

@@ -1,4 +1,4 @@
-"""The runner of experiments, which computes missing parts and writes metrics and reports."""
+"""The runner of experiments. It computes missing parts and writes metrics and reports."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -20,8 +20,7 @@ RecordT = TypeVar("RecordT")
 class Experiment(Protocol[PlayedT]):
     """Interface of an experiment for the runner; the fields of an experiment are its settings.
 
-    `hrc_env.experiments.study.Study` implements it for studies of whole episodes; the parts of
-    other experiments are not whole episodes.
+    `hrc_env.experiments.study.Study` implements it for studies with whole episodes as their parts.
     """
 
     @property
@@ -36,7 +35,7 @@ class Experiment(Protocol[PlayedT]):
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Seeds of all random draws."""
+        """Seeds from which all random numbers are generated."""
         ...
 
     @property
@@ -45,11 +44,11 @@ class Experiment(Protocol[PlayedT]):
         ...
 
     def settings(self) -> Mapping[str, Any]:
-        """Return all settings on which the numbers depend, for JSON."""
+        """Return all settings on which the numbers depend, as JSON values."""
         ...
 
     def play(self, cache: PartCache) -> PlayedT:
-        """Return the results of all parts, and compute those that are not in the cache."""
+        """Return the results of all parts; compute those that are not in the cache."""
         ...
 
     def metrics(self, played: PlayedT) -> dict[str, Metric]:
@@ -67,7 +66,7 @@ class Experiment(Protocol[PlayedT]):
 
 
 def describe_experiment(experiment: Experiment[Any]) -> dict[str, Any]:
-    """Return the settings of an experiment with its name, as in results.json."""
+    """Return the settings of an experiment with its name, as results.json contains them."""
     return {"experiment": experiment.name, **experiment.settings()}
 
 
@@ -92,7 +91,7 @@ def run_experiment(
         experiment: the experiment.
         out: folder of results and parts; parts of an earlier run with the same settings and
             versions are not computed again.
-        progress: callback that receives the increase of the completed share and the label of the
+        progress: callback that receives the increase of the completed fraction and the label of the
             current part.
         overwrite: whether to delete results of another study or of other settings in the folder.
         engine: engine that computes the parts, without effect on the results; None: the fastest on
@@ -119,7 +118,7 @@ def run_experiment(
 def is_as_short(config: Any, quick: Any) -> bool:
     """Return whether an experiment is as short as its quick form.
 
-    This holds if any of the numbers that the quick form reduces is no greater than in that form.
+    This holds if any of the numbers that the quick form reduces is at most the number in that form.
 
     Args:
         config: the settings, a dataclass whose fields all have defaults.

@@ -19,7 +19,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.estimators import ESTIMATORS
 
 RIGS_OF = {4: (ALL,), 3: TRIPLES, 2: (*OPPOSITE, (0, 1), (2, 3)), 1: SINGLE}
-"""Rigs by number of cameras; episodes rotate over them."""
+"""Rigs by number of cameras. Successive episodes use them in turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class PerceptionSetup:
     """The perception of a robot in a study: level, estimator, working cameras and latency."""
 
     level: str = "keypoints"
-    """Perception level, as `perception=` of an environment."""
+    """Perception level, as the argument `perception` of an environment."""
     estimator: str = "particle"
     """Name of the estimator, for levels with cameras."""
     n_cameras: int = 4
@@ -37,7 +37,8 @@ class PerceptionSetup:
     is_told: bool = True
     """Whether images carry their time stamps; otherwise they appear to be current."""
     is_alone: bool = False
-    """Whether the cameras that do not work are missing from the start, without a warm-up."""
+    """Whether cameras that do not work are absent from the start, in which case there is no
+    warm-up."""
 
     @property
     def name(self) -> str:
@@ -69,11 +70,11 @@ class PerceptionSetup:
 
     @property
     def turns(self) -> tuple[Turn, ...]:
-        """Cameras and their faults, over which episodes rotate."""
+        """Cameras and their faults, which successive episodes use in turn."""
         return self.list_turns(RIGS["lab"])
 
     def list_turns(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
-        """Return the cameras and faults over which episodes rotate, for any rig of four cameras.
+        """Return the cameras and faults that episodes use in turn, for any rig of four cameras.
 
         Args:
             rig: the four cameras of the rig.
@@ -90,7 +91,8 @@ LATE_S = (0.12, 0.2)
 LATE = tuple(PerceptionSetup(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
 """Setups of four cameras with delayed images, with and without time stamps."""
 ON_REQUEST = ("kalman", "ransac", "paper")
-"""Estimators that are compared only on request; with four cameras, `kalman` equals the default."""
+"""Names of estimators that are compared only on request. With four cameras, `kalman` equals the
+default."""
 REFERENCE = PerceptionSetup().name
 """Name of the setup with which all others are compared."""
 

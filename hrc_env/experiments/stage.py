@@ -1,7 +1,7 @@
 """Environments with one perception setup, for episodes of a fixed length.
 
-Workers ignore the robot, so that their motions are the same for all policies, estimators and
-shields. Episodes rotate over the setup's cameras.
+Workers ignore the robot. Their motions are therefore the same for all policies, estimators and
+shields. Successive episodes use the setup's choices of cameras in turn.
 """
 
 import warnings
@@ -25,9 +25,9 @@ from hrc_env.step_result import Observation
 from hrc_env.vector.shards import Shards
 
 PEOPLE = "unaware"
-"""Kind of workers, which ignore the robot: their motion does not depend on its actions."""
+"""Kind of workers. They ignore the robot: their motion does not depend on its actions."""
 N_TOGETHER = 300
-"""Greatest number of episodes that are played as one batch."""
+"""Maximum number of episodes that are played as one batch."""
 Rows = dict[str, list[Any]]
 """Lists of sums by name, one value per episode."""
 Block = Callable[[Shards, list[int], PartProgress], Rows]
@@ -35,7 +35,7 @@ Block = Callable[[Shards, list[int], PartProgress], Rows]
 
 
 class Stage:
-    """Environments of one setup, which are built when needed and reused."""
+    """Environments of one setup, which are created when they are needed and then reused."""
 
     def __init__(
         self, setup: PerceptionSetup, turns: Sequence[Turn], made_with: Mapping[str, Any]
@@ -49,7 +49,7 @@ class Stage:
         Args:
             seeds: one seed per episode; episode k uses turn k modulo the number of turns.
             play_block: function that plays a batch of episodes.
-            tick: callback that receives the increase of the completed share.
+            tick: callback that receives the increase of the completed fraction.
         """
         rows, n = Rows(), len(seeds)
         for k, turn in enumerate(self.turns[:n]):
@@ -84,12 +84,12 @@ class Stage:
 
 
 class EndlessEpisodes:
-    """Environments with episodes that continue after their end, for studies of a fixed length."""
+    """Environments that continue after the end of an episode, for studies of a fixed length."""
 
     def __init__(self, env: Shards) -> None:
         self.env = env
         self.terminated: Bools = np.zeros(env.bounds[-1], np.bool_)
-        """Mask (B,) of the environments in which an episode reached its end in the last step."""
+        """Mask (B,) of the environments in which the last step completed an episode."""
 
     def reset(self, seeds: Sequence[int]) -> Observation:
         """Begin an episode for every seed and return the observation."""

@@ -1,7 +1,7 @@
-"""Studies of whole episodes, declared by their rows, columns and tables.
+"""Studies of whole episodes, which are declared by their rows, columns and tables.
 
-An invalid declaration raises a `ConfigError` when it is made, for example if it names an unknown
-agent, estimator, shield, environment, argument, statistic or baseline.
+An invalid declaration raises a `ConfigError` at once, for example if it names an unknown agent,
+estimator, shield, environment, argument, statistic or baseline.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,11 +37,11 @@ Played = Mapping[str, list[dict[str, float]]]
 FOUR = PerceptionSetup()
 """Perception setup with four cameras without delay and detections from the emulator."""
 GIVEN_BY_SETUP = ("perception", "estimator")
-"""Arguments of the environment that are taken from `Row.setup`."""
+"""Arguments of the environment that are determined by `Row.setup`."""
 
 
 class Shard(NamedTuple):
-    """The episodes of one part of a row."""
+    """The episodes in one part of a row."""
 
     first_seed: int
     n_episodes: int
@@ -49,22 +49,23 @@ class Shard(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of a study: episodes of an agent in an environment."""
+    """A row of a study, with the episodes of an agent in an environment."""
 
     words: str | tuple[str, ...]
     """Text cells at the beginning of the row."""
     n_episodes: int
-    """Number of episodes, which use the first seeds of the study."""
+    """Number of episodes. They use the first seeds of the study."""
     agent: AgentChoice = "scripted"
     """Agent as `hrc_env.agents.registry.make_agent` accepts it, or a function that makes one."""
     setup: PerceptionSetup = FOUR
-    """Perception of the robot; episodes rotate over its cameras."""
+    """Perception of the robot. Successive episodes use the setup's choices of cameras in turn."""
     env: Mapping[str, Any] = field(default_factory=dict)
     """Other arguments of the environment, as in `gymnasium.make`."""
     baseline: str | None = None
-    """Name of the row with which `is_paired` columns compare this row on the same seeds."""
+    """Name of the row with which the columns that are `is_paired` compare this row on the same
+    seeds."""
     n_together: int = 250
-    """Greatest number of episodes in one part, which are played as one batch."""
+    """Maximum number of episodes in one part, which are played as one batch."""
     is_shown: bool = True
     """Whether the row appears in the table."""
     trust: bool = False
@@ -77,12 +78,12 @@ class Row:
 
     @property
     def n_steps(self) -> int:
-        """Greatest number of control steps in an episode."""
+        """Maximum number of control steps in an episode."""
         asked = self.env.get("max_episode_steps")
         return asked or find_task(self.env.get("task", DEFAULT)).max_episode_steps
 
     def keywords(self) -> list[dict[str, Any]]:
-        """Return the arguments of the environments over which episodes rotate."""
+        """Return the arguments of the environments that successive episodes use in turn."""
         setup, known = self.setup, dict(self.env)
         known["perception"] = setup.level
         if setup.level in ("keypoints", "pixels"):
@@ -99,7 +100,7 @@ class Row:
         ]
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings on which the episodes depend, except seeds, for JSON."""
+        """Return all settings on which the episodes depend, except seeds, as JSON values."""
         settings = {
             "agent": describe_agent(self.agent),
             "setup": asdict(self.setup),
@@ -125,7 +126,7 @@ class Row:
         check_names("perception", [self.setup.level], LEVELS)
         check_choice(self.agent)
         for keywords in self.keywords():
-            keywords.pop("max_episode_steps", None)  # Gymnasium's own
+            keywords.pop("max_episode_steps", None)  # an argument of Gymnasium
             resolve_settings(**keywords)
 
 
@@ -159,9 +160,9 @@ class Study:
     n_quick: int = 4
     """Number of episodes per row in the quick form."""
     threads: int | None = None
-    """Number of threads that environments share; None: the number of cores."""
+    """Number of threads that the environments share; None: the number of cores."""
     is_quick: bool = False
-    """Whether this is the quick form."""
+    """Whether this study is in its quick form."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a row, a column or a table is invalid."""
@@ -204,7 +205,7 @@ class Study:
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Seeds of the longest row."""
+        """Seeds of the row with the most episodes."""
         n_episodes = max((row.n_episodes for row in self.rows.values()), default=0)
         return range(self.first_seed, self.first_seed + n_episodes)
 
@@ -222,13 +223,13 @@ class Study:
         return describe_quick_run(max(row.n_episodes for row in self.rows.values()), seconds)
 
     def settings(self) -> dict[str, Any]:
-        """Return all settings on which the numbers depend, for JSON."""
+        """Return all settings on which the numbers depend, as JSON values."""
         rows = {name: {"n_episodes": row.n_episodes, **row.settings()}
                 for name, row in self.rows.items()}  # fmt: skip
         return {"first_seed": self.first_seed, "rows": rows}
 
     def select(self, beginnings: Sequence[str]) -> "Study":
-        """Return the study with only the rows of given name prefixes, and their baselines.
+        """Return the study with only the rows that have given name prefixes, and their baselines.
 
         Raises:
             ConfigError: one of the prefixes matches no row.
@@ -252,7 +253,7 @@ class Study:
         return replace(self, rows=rows, is_quick=True)
 
     def play(self, cache: PartCache) -> Played:
-        """Return the episodes of every row, and compute the parts that are not in the cache."""
+        """Return the episodes of every row; compute the parts that are not in the cache."""
         shards = [(name, shard) for name, row in self.rows.items()
                   for shard in split_row(row, self.first_seed)]  # fmt: skip
         is_drawn = [self.rows[name].setup.level == "pixels" for name, _ in shards]
@@ -303,7 +304,7 @@ class Study:
 
 
 def split_row(row: Row, first_seed: int) -> list[Shard]:
-    """Return the parts of a row, of at most `Row.n_together` episodes each."""
+    """Return the parts of a row; each has at most `Row.n_together` episodes."""
     return [
         Shard(first_seed + k, min(row.n_together, row.n_episodes - k))
         for k in range(0, row.n_episodes, row.n_together)
@@ -320,7 +321,7 @@ def play_shard(
         first_seed: seed of the first episode.
         n_episodes: number of episodes.
         threads: number of threads that environments share; None: the number of cores.
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     make, episodes = get_agent_factory(row.agent, row.trust), list[dict[str, float]]()
     turns = row.keywords()
@@ -336,7 +337,7 @@ def play_shard(
 
 
 def describe(value: Any) -> Any:
-    """Convert a value for JSON; a function becomes its name and the digest of its source file."""
+    """Convert a value to JSON; a function becomes its name and the digest of its source file."""
     if isinstance(value, Mapping):
         return {str(name): describe(each) for name, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,9 +1,9 @@
-"""Versions of behaviour, which show whether finished parts and tables are up to date.
+"""Versions of behaviour, which show whether cached parts and tables are up to date.
 
-`behaviour.toml` gives each subsystem a version number. A study names the subsystems on which its
-results depend; a part computed with other versions or other settings is computed again. Probes
-(`tests/behaviour/`) increase the number when the behaviour of its subsystem changes, so that
-changes of code without effect on behaviour invalidate no parts.
+`behaviour.toml` contains a version number for each subsystem. A study names the subsystems on which
+its results depend; a part that was computed with other versions or settings is computed again. If
+the probes in `tests/behaviour/` detect a change in the behaviour of a subsystem, its number is
+increased. Changes of code that do not affect behaviour therefore do not invalidate parts.
 """
 
 import hashlib
@@ -17,7 +17,7 @@ from typing import Any
 from hrc_env.core.errors import ConfigError, check_names
 
 SUBSYSTEMS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
-"""Names in `behaviour.toml`."""
+"""Names of the subsystems in `behaviour.toml`."""
 _PACKAGE = Path(__file__).parents[1]
 
 
@@ -77,7 +77,7 @@ def select_versions(subsystems: Iterable[str]) -> dict[str, int]:
 
 
 def make_key(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
-    """Return the key of a finished part: a digest of its settings and of the subsystems' versions.
+    """Return the cache key of a part: a digest of its settings and of its subsystems' versions.
 
     Args:
         settings: all settings on which the part's numbers depend besides the code, for JSON.
@@ -95,8 +95,8 @@ def hash_file(path: Path) -> str:
 def hash_source(item: object) -> str:
     """Return the digest of the file that defines an object registered by a user.
 
-    It replaces a version, which a user's object does not have. The digest is "" for objects of this
-    package, which have versions, and for objects without a file.
+    It replaces the version number, which does not exist for users' objects. It is "" for objects of
+    this package, which have version numbers, and for objects without a file.
     """
     try:
         path = Path(inspect.getfile(item)).absolute()  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Linear assignment: each row of a cost matrix gets a different column, at minimum total cost.
+"""Linear assignment of the rows of a cost matrix to different columns, at minimum total cost.
 
 The method is shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), as a compiled
 kernel for matrices with few rows.
@@ -16,7 +16,7 @@ def assign_rows(cost: Floats, column: Ints) -> None:
 
     Args:
         cost: (n, m) finite costs, with m >= n.
-        column: (n,) output: the column of each row.
+        column: (n,) output: the column assigned to each row.
     """
     n_rows, n_columns = cost.shape
     if n_columns == 1:

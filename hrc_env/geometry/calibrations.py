@@ -11,9 +11,9 @@ rotation = [1.2, -1.2, 1.1]
 translation = [0.1, 1.4, 3.1]
 
 `rotation` (a Rodrigues vector or a matrix) and `translation` transform points from the world to the
-camera frame. `fisheye = true` selects OpenCV's fisheye model. These tools measure pixel coordinates
-from the centre of the first pixel, but this package from the image's corner: half a pixel is added
-to the principal point.
+camera frame. `fisheye = true` selects OpenCV's fisheye model. Because these tools measure pixel
+coordinates from the centre of the first pixel, and this package measures them from the image's
+corner, half a pixel is added to the principal point.
 """
 
 import math
@@ -30,16 +30,17 @@ from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, ma
 from hrc_env.geometry.rotations import from_rotation_vector
 
 ENTRIES = ("size", "matrix", "distortions", "rotation", "translation")
-"""Entries that the table of a camera must contain."""
+"""Names of the entries that the table of a camera must contain."""
 HALF_PX = 0.5
 """Distance along each axis from the centre of the first pixel to the image's corner [px]."""
 MAX_SPREAD_M = 30.0
-"""Greatest distance of cameras from their centroid, or of a single camera from the origin [m];
-files with greater lengths are assumed to be in millimetres."""
+"""Maximum plausible distance of cameras from their centroid, or of a single camera from the origin
+[m]. Files with greater lengths are assumed to be in millimetres."""
 MM = 1e-3
-"""Length of a millimetre [m]."""
+"""One millimetre in metres."""
 MIN_UPRIGHT = 0.7
-"""Minimum component of the images' upright direction along the upward axis of the world."""
+"""Minimum component of the images' mean upright direction along a world axis for that axis to be
+regarded as the upward one."""
 
 
 def is_calibration(content: Mapping[str, Any]) -> bool:
@@ -50,12 +51,12 @@ def is_calibration(content: Mapping[str, Any]) -> bool:
 def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras of a calibration that another tool has written.
 
-    Lengths in millimetres are converted to metres. A `UserWarning` reports such a conversion, and a
-    world frame whose z axis does not point upwards.
+    Lengths in millimetres are converted to metres. A `UserWarning` is issued for such a conversion,
+    and if the z axis of the world frame does not point upwards.
 
     Args:
         content: content of the file.
-        path: path of the file, for messages.
+        path: path of the file, for error messages.
 
     Raises:
         ConfigError: a camera has no extrinsics, lacks another entry, or has an unknown lens.
@@ -73,7 +74,7 @@ def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[Cam
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the tables of a file that may be cameras, by key; Caliscope nests them in a table."""
+    """Return the tables of a file that may describe cameras, by key; Caliscope's are nested."""
     nested = content.get("cameras")
     inside = cast("Mapping[str, Any]", nested) if isinstance(nested, Mapping) else content
     return {key: each for key, each in inside.items() if isinstance(each, Mapping)}
@@ -119,7 +120,7 @@ def _parse_numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) 
 
 
 def _convert_to_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[CameraConfig, ...]:
-    """Return the cameras in metres; warn if the file has another unit or upward axis."""
+    """Return the cameras with lengths in metres; warn of another unit or upward axis."""
     eyes = np.array([camera.eye_world for camera in cameras])
     centred = eyes - eyes.mean(0) if len(eyes) > 1 else eyes
     unit_m = MM if np.linalg.norm(centred, axis=-1).max() > MAX_SPREAD_M else 1.0

@@ -34,14 +34,14 @@ from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
 from hrc_env.geometry.rotations import about_axis, look_at
 
 MOST_CAMERAS = 16
-"""Greatest number of cameras in a rig."""
+"""Maximum number of cameras in a rig."""
 SIZE_PX = (64, 16_384)
 """Minimum and maximum width and height of an image [px]."""
 HFOV_DEG = (1.0, 340.0)
-"""Minimum and maximum horizontal field of view [degrees]; without a fisheye lens, the maximum is
+"""Minimum and maximum horizontal field of view [degrees]. Without a fisheye lens, the maximum is
 179."""
 MAX_LATENCY_S = 1.0
-"""Greatest latency of a camera, which is the length of the tracker's memory [s]."""
+"""Maximum latency of a camera, which is limited by the tracker's memory [s]."""
 
 
 @answer_unknown_fields
@@ -54,8 +54,8 @@ class CameraConfig:
     eye_world: tuple[float, float, float]
     """Position of the camera in the world frame [m]."""
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
-    """Point in the world frame at which the camera points [m]; the default is the centre of the
-    space that robot and worker share."""
+    """Point in the world frame at which the camera is aimed [m]. The default is the centre of the
+    workspace shared by robot and worker."""
     hfov_deg: float = 90.0
     """Horizontal field of view through the lens [degrees]; ignored if `focal_px` is given."""
     width_px: int = 1920
@@ -69,15 +69,15 @@ class CameraConfig:
     centre_px: tuple[float, ...] = ()
     """Principal point cx, cy [px]; if empty, the centre of the image."""
     lens: Lens = field(default_factory=Lens)
-    """Distortion of the image by the lens."""
+    """Distortion model of the lens."""
     rate_hz: float = 0.0
-    """Frame rate; images are taken at control steps, and at all of them if it is 0 [Hz]."""
+    """Frame rate [Hz]. Images are taken at control steps; with 0, at every control step."""
     latency_s: float = 0.0
-    """Delay from the exposure of an image to its arrival, at most 1 s; the tracker applies an image
-    at the time of its exposure [s]."""
+    """Delay from the exposure of an image to its arrival, at most 1 [s]. The tracker applies an
+    image at the time of its exposure."""
     exposure_s: float = 0.0
-    """Exposure time, at most 0.1 s; it causes motion blur, but only at perception level `pixels`
-    [s]."""
+    """Exposure time, at most 0.1 [s]. It causes motion blur, but only at perception level
+    `pixels`."""
 
     def __post_init__(self) -> None:
         places = (*self.eye_world, *self.target_world, self.roll_deg)
@@ -132,12 +132,13 @@ class CameraConfig:
         distortion: Lens | Sequence[float] = (),
         fisheye: bool = False,
     ) -> "CameraConfig":
-        """Return the camera with these matrices, which projects points as OpenCV does.
+        """Return the camera with the given matrices, in the conventions of OpenCV.
 
         Args:
             name: name of the camera, unique in its rig.
-            K: (3, 3) intrinsics without skew [px]. Pixel coordinates start at the image's corner;
-                if those of a K start at the centre of the first pixel, add 0.5 to cx and cy.
+            K: (3, 3) intrinsics without skew [px]. Pixel coordinates are measured from the image's
+                corner; if a calibration measures them from the centre of the first pixel, add 0.5
+                to cx and cy.
             T_world_from_cam: (4, 4) pose of OpenCV's camera axes in the world, with z up [m].
             size_px: width and height of the image [px].
             distortion: a lens, or OpenCV's coefficients.
@@ -178,7 +179,7 @@ class CameraConfig:
 
 @dataclass(frozen=True, slots=True)
 class _Matrices:
-    """The arguments of `CameraConfig.from_matrices`, as they occur in mappings and rig files."""
+    """The arguments of `CameraConfig.from_matrices`, as entries of mappings and rig files."""
 
     name: str
     K: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
@@ -215,7 +216,7 @@ def parse_camera(content: Mapping[str, Any], path: str) -> CameraConfig:
 
 
 def make_lens(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens:
-    """Return the lens with OpenCV's coefficients, or raise `ConfigError` if there are too many."""
+    """Return a lens with OpenCV's coefficients; raise `ConfigError` if there are too many."""
     values = [float(each) for each in distortion]
     while values and values[-1] == 0.0:
         values.pop()
@@ -229,7 +230,7 @@ def make_lens(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Le
 
 
 def axes_of(camera: CameraConfig) -> Rotations:
-    """Return the orientation R_world_from_cam of OpenCV's camera axes."""
+    """Return the orientation R_world_from_cam of a camera, with OpenCV's camera axes."""
     look = look_at(np.array(camera.eye_world, float), np.array(camera.target_world, float))
     return look @ about_axis("z", np.radians(camera.roll_deg)) if camera.roll_deg else look
 
@@ -247,7 +248,7 @@ def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
 
 
 def intrinsics(camera: CameraConfig) -> Floats:
-    """Return K (3, 3) [px], for continuous pixel coordinates from the image's corner."""
+    """Return the intrinsics K (3, 3) [px] for pixel coordinates from the image's corner."""
     fx, fy = camera.focal_px or (_focal_px(camera),) * 2
     cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
@@ -293,9 +294,9 @@ MAKES: dict[str, CameraConfig] = {
         "gopro_hero8_wide", (0.0, 0.0, 2.4), hfov_deg=118.2, lens=Lens("kannala_brandt", (0.0667,))
     )
 }
-"""Commercial cameras (`CameraConfig.from_make`). The GoPro HERO8 Black with its wide lens is the
-paper's camera: 118.2 x 69.5 degrees on 1920 x 1080 px. No pinhole camera with square pixels has
-both fields of view, but the fisheye polynomial with this coefficient does."""
+"""Commercial cameras for `CameraConfig.from_make`. The GoPro HERO8 Black with its wide lens is the
+paper's camera, with 118.2 x 69.5 degrees on 1920 x 1080 px. No pinhole camera with square pixels
+has both fields of view, but the fisheye polynomial with this coefficient has."""
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:

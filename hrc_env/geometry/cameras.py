@@ -1,11 +1,11 @@
 """Cameras: projection of points to pixels, and of pixels to rays.
 
 A camera with a lens has two kinds of pixel coordinates: `pinhole` pixels, which result from a
-linear projection and which trackers use, and `image` pixels, which detectors find. Without a lens,
-both are equal.
+linear projection and are used by trackers, and `image` pixels of the distorted image, which are
+used by detectors. Without a lens, both are equal.
 
-Pixel coordinates are continuous from the image's top-left corner: pixel centres lie at
-half-integers. Camera axes are OpenCV's: +X right, +Y down, +Z forward.
+Pixel coordinates are continuous and measured from the image's top-left corner, so that pixel
+centres have half-integer coordinates. Camera axes are OpenCV's: +X right, +Y down, +Z forward.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from hrc_env.geometry.rotations import look_at
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
-    """A camera with a known pose: a pinhole camera unless it has a lens."""
+    """A camera with a known pose: a pinhole camera, optionally with a distorting lens."""
 
     name: str
     """Name of the camera, unique in its rig."""
@@ -51,7 +51,7 @@ class Projection(NamedTuple):
     """Points projected into the images of cameras."""
 
     px: Points2
-    """(B, C, ..., 2) pinhole pixels, which are meaningless where the depth is not positive."""
+    """(B, C, ..., 2) pinhole pixels, which are meaningless if the depth is not positive."""
     depth_m: Floats
     """(B, C, ...) distance along the camera's axis [m]; negative behind the camera."""
 
@@ -135,7 +135,7 @@ def image_from_pinhole(camera: PinholeCamera, pixels: Points2) -> Points2:
 
 
 def pinhole_from_image(camera: PinholeCamera, pixels: Points2) -> Points2:
-    """Convert image pixels (..., 2) to pinhole pixels, NaN where there are none."""
+    """Convert image pixels (..., 2) to pinhole pixels; the result is NaN if there are none."""
     if camera.lens is None:
         return pixels
     return _denormalise(camera, undistort(camera.lens, _normalise(camera, pixels)))
@@ -149,12 +149,12 @@ def pinhole_magnification(camera: PinholeCamera, pinhole_px: Points2) -> Floats 
 
 
 def _normalise(camera: PinholeCamera, pixels: Points2) -> Floats:
-    """Convert pixels (..., 2) to focal lengths from the principal point."""
+    """Convert pixels (..., 2) to offsets from the principal point in focal lengths."""
     return (pixels - camera.K[:2, 2]) / camera.K[[0, 1], [0, 1]]
 
 
 def _denormalise(camera: PinholeCamera, normalised: Floats) -> Points2:
-    """Convert positions (..., 2) in focal lengths from the principal point to pixels."""
+    """Convert offsets (..., 2) from the principal point in focal lengths to pixels."""
     return normalised * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
 
 

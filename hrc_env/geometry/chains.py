@@ -31,9 +31,9 @@ from hrc_env.core.typing import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SerialChain:
-    """The geometry and the limits of a robot, as in its data sheet.
+    """Kinematics, collision capsules and joint limits of a robot.
 
-    Units are those of hinges; for slides, rad stands for m.
+    Units are given for hinges; for slides, replace rad by m.
     """
 
     T_world_from_base: Transforms
@@ -62,7 +62,7 @@ class SerialChain:
 
 
 class RobotPath(NamedTuple):
-    """A robot at the end of a path, and its capsules along the path."""
+    """State of a robot at the end of a path, and its capsules along the path."""
 
     robot: RobotState
     """State of the robot at the end of the path."""

@@ -16,17 +16,18 @@ from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3
 
 SLACK_M = 1e-9
-"""Tolerance of the bounds by bounding spheres, far greater than their rounding errors [m]."""
+"""Tolerance of the distance bounds from bounding spheres, far above their rounding errors [m]."""
 _PARALLEL = 1e-13
-"""Squared sine of the angle below which segments are considered parallel; they then diverge by less
-than a micrometre per metre."""
+"""Squared sine of the angle below which segments are considered parallel. Such segments diverge by
+less than a micrometre per metre."""
 _ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
-"""(K, 2, 2) two joints with each end at their midpoint; for an end at a joint, that joint twice."""
+"""(K, 2, 2) indices of the two joints with each end of a segment at their midpoint; if an end is at
+a joint, both indices are that of the joint."""
 
 
 @dataclass(frozen=True, slots=True)
 class Separation:
-    """The smallest distance between two sets of capsules, for any leading axes (...)."""
+    """The smallest distance between two sets of capsules, with any leading axes (...)."""
 
     distance_m: Floats
     """(...,) distance between the surfaces [m]; negative for overlaps, infinite for empty sets."""
@@ -54,13 +55,13 @@ def least_separation(
 
     Args:
         capsules_a: (..., Ka, 2, 3) end points of the first set [m].
-        radius_a_m: (..., Ka) radii of the first set, with all, some of the first or none of the
-            leading axes of `capsules_a` [m].
+        radius_a_m: (..., Ka) radii of the first set [m]. The leading axes are the first n of those
+            of `capsules_a`, with any n.
         capsules_b: (..., Kb, 2, 3) end points of the second set [m]. The leading axes are those of
-            `capsules_a`, or these and further ones; each first set is then compared with several
-            second sets.
-        radius_b_m: (..., Kb) radii of the second set [m], likewise; if there are several second
-            sets, the radii of a single body suffice.
+            `capsules_a`, optionally followed by further ones; in that case, each first set is
+            compared with several second sets.
+        radius_b_m: (..., Kb) radii of the second set [m], with leading axes as for `radius_a_m`. If
+            there are several second sets, the radii of a single body suffice.
     """
     lead = capsules_b.shape[:-3]
     flat_a, flat_b = flatten_axes(capsules_a, 3), flatten_axes(capsules_b, 3)
@@ -140,7 +141,8 @@ def _find_narrowest(
 def _bound_capsules(capsules: Capsules, radius: Floats, spheres: Floats) -> None:
     """Compute bounding spheres (5, K) of capsules: centre, radius and the capsule's radius [m].
 
-    If there are fewer radii than capsules, the radii are those of a body and repeat for each body.
+    If there are fewer radii than capsules, they are the radii of one body and are repeated for
+    every body.
     """
     for k in range(len(capsules)):
         squared, capsule_radius = 0.0, radius[k % len(radius)]

@@ -10,7 +10,8 @@ image. There are two models, with OpenCV's coefficients:
 | `kannala_brandt` | angle t from the axis at radius t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) |
 
 The second is that of Kannala and Brandt (2006) and of OpenCV's `fisheye` module. Beyond the angle
-at which a polynomial stops growing, it would fold the image over; light from there is not imaged.
+at which the polynomial reaches its maximum, the model would fold the image over; light from such
+angles is not imaged.
 
 Kernels take a lens as a row (8,): model, five coefficients, `LIMIT` and `FOLD` (see `lens_row`).
 """
@@ -33,18 +34,18 @@ COEFFICIENTS: dict[str, tuple[str, ...]] = {
     "brown_conrady": ("k1", "k2", "p1", "p2", "k3"),
     "kannala_brandt": ("k1", "k2", "k3", "k4"),
 }
-"""Names of each model's coefficients, in order; omitted coefficients are 0."""
+"""Names of the coefficients of each model, in OpenCV's order."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
-"""Numbers of the models in the row of a lens."""
+"""Numbers that identify the models in the row of a lens."""
 LIMIT, FOLD = 6, 7
-"""Columns of a lens's row: the distorted radius beyond which nothing is imaged [focal lengths], and
-the corresponding angle from the optical axis [rad]."""
+"""Columns of a lens's row with the distorted radius beyond which nothing is imaged [focal lengths]
+and the corresponding angle from the optical axis [rad]."""
 WIDEST_RAD = math.radians(175.0)
-"""Greatest angle from the optical axis that a fisheye lens can image [rad]."""
+"""Maximum angle from the optical axis that a fisheye lens can image [rad]."""
 PINHOLE_RAD = math.radians(80.0)
-"""Greatest angle from the optical axis at which undistorted points are defined [rad]."""
+"""Maximum angle from the optical axis at which undistorted points are defined [rad]."""
 FAR = 1e6
-"""Factor by which points that a lens does not image are moved away from the image's centre."""
+"""Factor by which points that a lens does not image are moved away from the image centre."""
 _SAMPLES = 4096
 _NEWTON_STEPS = 12
 _STEP = 1e-5
@@ -53,7 +54,7 @@ _STEP = 1e-5
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """The distortion model of a lens."""
+    """A distortion model of a lens with its coefficients."""
 
     model: str = "none"
     """Name of the model: "none", "brown_conrady" or "kannala_brandt"."""
@@ -105,14 +106,14 @@ def distort(lens: Lens, undistorted: Floats) -> Floats:
 
 
 def magnification(lens: Lens, undistorted: Floats) -> Floats:
-    """Return the ratio of a short line's length in the pinhole image to that in the real image.
+    """Return the local ratio of lengths in the pinhole image to lengths in the real image.
 
     Args:
         lens: the lens.
-        undistorted: (..., 2) position of the line in the pinhole image.
+        undistorted: (..., 2) position in the pinhole image.
 
     Returns:
-        (...,) geometric mean of the ratios in both directions.
+        (...,) geometric mean of the ratios in two orthogonal directions.
     """
     places = flatten_axes(np.asarray(undistorted, float), 1)
     out = np.empty(len(places))
@@ -121,14 +122,17 @@ def magnification(lens: Lens, undistorted: Floats) -> Floats:
 
 
 def undistort(lens: Lens, distorted: Floats) -> Floats:
-    """Convert distorted points (..., 2) to undistorted ones, NaN beyond `PINHOLE_RAD`."""
+    """Convert distorted points (..., 2) to undistorted ones, or NaN beyond `PINHOLE_RAD`."""
     ray = rays_cam(lens, distorted)
     ahead = ray[..., 2:] > math.cos(PINHOLE_RAD)
     return np.where(ahead, ray[..., :2] / np.where(ahead, ray[..., 2:], 1.0), np.nan)
 
 
 def rays_cam(lens: Lens, distorted: Floats) -> Points3:
-    """Return the unit directions (..., 3) in camera axes of distorted points (..., 2), or NaN."""
+    """Return unit vectors (..., 3), in camera axes, to distorted points (..., 2).
+
+    They are NaN for points that the lens does not image.
+    """
     places = flatten_axes(np.asarray(distorted, float), 1)
     out = np.empty((len(places), 3))
     _cast_rays(lens_row(lens), places, out)
@@ -136,14 +140,17 @@ def rays_cam(lens: Lens, distorted: Floats) -> Points3:
 
 
 def distorted_radius(lens: Lens, angle_rad: float) -> float:
-    """Return the distorted radius of light at an angle to the axis [focal lengths], or NaN."""
+    """Return the distorted radius of light at an angle to the axis [focal lengths].
+
+    It is NaN for light that the lens does not image.
+    """
     row = lens_row(lens)
     return float(_radius_at(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 
 
 @kernel
 def _distort_all(row: Floats, places: Floats, out: Floats) -> None:
-    """Convert undistorted points (n, 2) to distorted ones, `out` (n, 2)."""
+    """Convert undistorted points (n, 2) to distorted points `out` (n, 2)."""
     for i in range(len(places)):
         out[i, 0], out[i, 1] = distort_point(row, places[i, 0], places[i, 1])
 
@@ -164,7 +171,7 @@ def _cast_rays(row: Floats, places: Floats, out: Points3) -> None:
 
 @kernel
 def distort_point(row: Floats, x: float, y: float) -> ImagePoint:
-    """Return the distorted position of an undistorted point; far away if it is not imaged."""
+    """Return the distorted position of an undistorted point; a distant one if it is not imaged."""
     squared = x * x + y * y
     if row[0] != NONE and squared > math.tan(row[FOLD]) ** 2 and row[FOLD] < 0.5 * math.pi:
         return ImagePoint(FAR * x, FAR * y)
@@ -184,7 +191,7 @@ def distort_point(row: Floats, x: float, y: float) -> ImagePoint:
 
 @kernel
 def magnification_at(row: Floats, x: float, y: float) -> float:
-    """Return the `magnification` of a lens at one undistorted point."""
+    """Return the `magnification` of a lens at a single undistorted point."""
     if row[0] == NONE:
         return 1.0
     left, right = distort_point(row, x - _STEP, y), distort_point(row, x + _STEP, y)
@@ -231,7 +238,8 @@ def _unit_ray(row: Floats, x: float, y: float) -> Vector3:
 def _solve_angle(row: Floats, radius: float) -> float:
     """Return the angle to the axis [rad] of light that arrives at a radius below the limit.
 
-    The equation is solved by Newton's method, with bisection if a step leaves the bracket.
+    The equation is solved by Newton's method, with a bisection step whenever a Newton step leaves
+    the bracket.
     """
     low, high = 0.0, row[FOLD]
     angle = min(radius, 0.5 * high)

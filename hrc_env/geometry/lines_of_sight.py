@@ -14,7 +14,7 @@ MIN_CROSSING = 0.1
 
 
 class Camera:
-    """A pinhole camera of the rig, derived from its projection matrix."""
+    """Parameters of a pinhole camera, derived from its projection matrix."""
 
     P: Annotated[Floats, (3, 4)]
     """Projection matrix from homogeneous world coordinates to homogeneous pixels."""
@@ -50,7 +50,7 @@ def cameras_of(P: Floats) -> Records1[Camera]:
 
 @kernel
 def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
-    """Fill in the fields of cameras (C,) from their projection matrices P (C, 3, 4)."""
+    """Compute the fields of cameras (C,) from their projection matrices P (C, 3, 4)."""
     for c in range(len(P)):
         a, camera, inverse = P[c], cameras[c], cameras[c].back
         for i in range(3):
@@ -78,7 +78,7 @@ def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
 def nearest_places(
     eye_1: Floats, ray_1: Floats, eye_2: Floats, ray_2: Floats, middle: Floats
 ) -> Crossing:
-    """Find the points at which two lines are closest to each other, and their midpoint.
+    """Find the points at which two lines are closest to each other, and the points' midpoint.
 
     Args:
         eye_1: (3,) origin of the first line [m].

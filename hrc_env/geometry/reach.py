@@ -1,4 +1,4 @@
-"""Positions that the tool of a robot must reach, and a check that the arm is long enough."""
+"""Positions that the tool of a robot must reach, and a check of the arm's length."""
 
 import itertools
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ from hrc_env.core.typing import Points3
 from hrc_env.geometry.chains import SerialChain, link_frames
 
 Triple = tuple[float, float, float]
-"""Three coordinates."""
+"""A tuple of three coordinates."""
 
 
 @answer_unknown_fields
@@ -22,22 +22,22 @@ class ReachTarget:
     """A position that the tool point of a robot must reach."""
 
     name: str
-    """Name of the target with its article, for error messages."""
+    """Name of the target including its article (such as "the goal"), for error messages."""
     place_world: Triple | Points3
     """Position of the target in the world frame [m]."""
     along_world: Triple | None = None
     """Unit vector along which the tool points at the target; None if any direction is allowed."""
     within_m: float = 0.0
-    """Tolerance: greatest distance from the target that counts as reached [m]."""
+    """Tolerance: maximum distance from the target at which it counts as reached [m]."""
 
 
 class WristReach(NamedTuple):
-    """The sphere around an arm's second joint that contains all positions of its last joint."""
+    """A sphere around the second joint of an arm that contains all positions of its last joint."""
 
     shoulder_world: Points3
     """(3,) position of the second joint in the world frame [m]."""
     radius_m: float
-    """Greatest distance of the last joint from the second one [m]."""
+    """Maximum distance of the last joint from the second one [m]."""
 
 
 def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
@@ -47,11 +47,11 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
         task: id of the task, for the error message.
         robot: name of the robot, for the error message.
         chain: geometry of the robot; robots with slides are not checked.
-        targets: the targets.
+        targets: positions that the tool point must reach.
 
     Raises:
         ConfigError: a target requires a greater distance between the second and the last joint than
-            is possible.
+            the arm can reach.
     """
     if chain.slides.any():
         return
@@ -76,7 +76,7 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
 def wrist_reach(chain: SerialChain) -> WristReach:
     """Return the reach of an arm's last joint.
 
-    It is the greatest distance over all poses with joint angles of multiples of 90 degrees; arms of
+    It is the maximum distance over all poses with joint angles of multiples of 90 degrees; arms of
     the usual designs reach farthest in one of these poses.
     """
     steps = 0.5 * np.pi * np.arange(-2, 3)

@@ -1,4 +1,4 @@
-"""The properties of a robot that a shield needs, apart from the state measured by the encoders."""
+"""Constant properties of a robot that shields need, in addition to the measured joint state."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,11 @@ from hrc_env.geometry.chains import SerialChain
 class RobotModel:
     """A robot's geometry, the limits of its commands and its effective mass.
 
-    Units are those of hinges; for slides, rad stands for m.
+    Units are given for hinges; for slides, replace rad by m.
     """
 
     chain: SerialChain
-    """Geometry of the links, with the collision capsules."""
+    """Kinematics and collision capsules of the links."""
     fastest_rad_s: Floats
     """(N,) maximum velocity that an action can command for each joint [rad/s]."""
     slew_rad_s2: Floats

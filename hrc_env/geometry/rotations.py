@@ -1,4 +1,4 @@
-"""Rotations as matrices, for any leading axes, and by unit quaternions (scalar first)."""
+"""Rotations by matrices with any leading axes, and by unit quaternions (scalar first)."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
 
 
 def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
-    """Return the orientation R_world_from_cam of a camera at one point that points at another.
+    """Return the orientation R_world_from_cam of a camera that is aimed at a point.
 
     The camera's axes are OpenCV's (+X right, +Y down, +Z forward), and its image is upright. If the
     line of sight is vertical, +Y of the image is -Y of the world.

@@ -1,6 +1,6 @@
 """Convex shapes as rows of tables (n, `WIDTH`), and their exact intersections with lines.
 
-A line is given by its origin (the eye), relative to the centre of the shape [m], and by a unit
+A line is given by its origin (the eye) relative to the centre of the shape [m], and by a unit
 direction. Its passage is the interval of distances from the eye over which it is inside the shape.
 """
 
@@ -13,14 +13,15 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Capsules, Floats, Vector3
 
 PLANE, BOX, CYLINDER, CAPSULE = range(4)
-"""Kinds of shapes; a sphere is a capsule of length zero."""
+"""Kinds of shapes. A sphere is a capsule of length zero."""
 KIND, CENTRE, AXES, HALF_SIZE, REACH, WIDTH = 0, 1, 4, 13, 16, 17
-"""Indices of the columns of a table, and their number: kind, centre [m], axes x, y and z, half edge
-lengths (or radius and half length along z) [m] and radius of the bounding sphere [m]."""
+"""Indices of the first columns of the entries of a table, and the number of columns. The entries
+are kind, centre [m], axes x, y and z, half edge lengths (or radius and half length along z) [m],
+and radius of the bounding sphere [m]."""
 PARALLEL = 1e-12
 """Squared sine of the angle below which a line is considered parallel to an axis."""
 Vector: TypeAlias = Floats | Vector3
-"""A vector (3,), as an array or a `Vector3`."""
+"""A vector (3,), either an array or a `Vector3`."""
 
 
 class Passage(NamedTuple):
@@ -77,7 +78,7 @@ def absent_shape() -> Floats:
 
 
 def bounds(table: Floats) -> Floats:
-    """Return the lowest and highest corners (2, 3) of a box around boxes and capsules [m]."""
+    """Return the minimum and maximum corners (2, 3) of a bounding box of boxes and capsules [m]."""
     axes, half = np.abs(table[:, AXES:HALF_SIZE].reshape(-1, 3, 3)), table[:, HALF_SIZE:REACH]
     boxes = np.einsum("gi,gij->gj", half, axes)
     rods = half[:, 1:2] * axes[:, 2] + half[:, :1]
@@ -219,7 +220,7 @@ def _cross_box(table: Floats, row: int, eye: Vector, direction: Vector) -> Passa
 
 @kernel
 def _cross_plane(table: Floats, row: int, eye: Vector, direction: Vector) -> Passage:
-    """Return the passage through a rectangle, which only intersects lines from its front (+z)."""
+    """Return the point, as a `Passage`, at which a line crosses a rectangle from its front (+z)."""
     height, rise = on_axis(table, row, 2, eye), on_axis(table, row, 2, direction)
     if height < 0.0 or rise >= 0.0:
         return NEVER
@@ -233,7 +234,7 @@ def _cross_plane(table: Floats, row: int, eye: Vector, direction: Vector) -> Pas
 
 @kernel
 def _cross_slab(height: float, rise: float, half: float) -> Passage:
-    """Return the interval over which a line is between parallel planes at -half and half [m]."""
+    """Return the interval over which a line is between planes at `-half` and `half` [m]."""
     if rise == 0.0:
         return ALWAYS if abs(height) <= half else NEVER
     one, other = (-half - height) / rise, (half - height) / rise

@@ -17,11 +17,11 @@ from hrc_env.geometry import shapes
 from hrc_env.geometry.shapes import Passage, Vector
 
 NEAR_POINT_M = 0.08
-"""Length of the last part of a line of sight in which occluders are ignored, so that an object in
-contact with a joint does not hide it [m]."""
+"""Length at the end of a line of sight in which occluders are ignored [m]. It prevents an object in
+contact with a joint from hiding the joint."""
 BLOCKING_CHORD = 1.4
-"""Length inside a body's capsule above which a line is blocked, in units of the radius; lines
-within about 0.7 radii of the axis exceed it."""
+"""Length inside a body's capsule above which a line counts as blocked, in units of the capsule's
+radius. Lines within about 0.7 radii of the axis exceed it."""
 OWN_CAPSULE_M = 0.06
 """Additional length that is allowed inside the capsule that contains the joint itself [m]."""
 
@@ -42,10 +42,10 @@ class Surroundings:
 
 
 class Occluders(NamedTuple):
-    """A table of shapes that ends with the workers' capsules, and a list of the shapes in view."""
+    """A table of shapes, with the workers' capsules last, and a list of the shapes in view."""
 
     table: Floats
-    """(G, `shapes.WIDTH`) all shapes."""
+    """(G, `shapes.WIDTH`) table of all shapes."""
     first_body: int
     """Row of the first of the workers' capsules."""
     spheres: Floats
@@ -56,7 +56,7 @@ class Occluders(NamedTuple):
 
 
 class Ball(NamedTuple):
-    """A sphere in coordinates relative to an eye."""
+    """A sphere with coordinates relative to an eye."""
 
     x: float
     """First coordinate of the centre, relative to the eye [m]."""
@@ -84,7 +84,7 @@ def no_surroundings(batch: int) -> Surroundings:
 
 
 def find_hidden(surroundings: Surroundings, eyes_world: Points3, points_world: Points3) -> Bools:
-    """Return a mask of the points that are hidden from each eye.
+    """Return a mask of the points that are hidden from the eyes.
 
     Args:
         surroundings: occluders of B environments.
@@ -92,7 +92,7 @@ def find_hidden(surroundings: Surroundings, eyes_world: Points3, points_world: P
         points_world: (B, J, 3) positions of the points [m].
 
     Returns:
-        (B, C, J) True where an occluder is between eye and point.
+        (B, C, J) mask, which is True if an occluder is between the eye and the point.
     """
     batch = len(surroundings.capsules_world)
     check_shape("points_world", points_world.shape[::2], (batch, 3), "environments, ..., xyz")
@@ -198,7 +198,7 @@ def _bounding_ball(eye: Floats, points: Points3) -> Ball:
 
 @kernel
 def _is_plane_between(eye: Floats, points: Points3, table: Floats, row: int) -> bool:
-    """Return whether an eye (3,) is in front of a plane and any of the points (J, 3) behind it."""
+    """Return whether a plane separates an eye (3,) in front of it from any of the points (J, 3)."""
     level = shapes.on_axis(table, row, 2, table[row, shapes.CENTRE : shapes.AXES])
     if shapes.on_axis(table, row, 2, eye) < level:
         return False
@@ -216,7 +216,7 @@ def is_hidden(eye: Floats, points: Points3, j: int, occluders: Occluders, n_view
         eye: (3,) position of the eye [m].
         points: (J, 3) positions of the points [m].
         j: index of the point.
-        occluders: the shapes, after a call of `select_occluders`.
+        occluders: the shapes, as prepared by `select_occluders`.
         n_view: number of shapes in view, as returned by `select_occluders`.
     """
     table, view = occluders.table, occluders.spheres
@@ -253,7 +253,7 @@ def _hits_sphere(view: Floats, i: int, line: Line) -> bool:
 
 @kernel
 def _is_blocked(passage: Passage, length: float) -> bool:
-    """Return whether a line of the given length [m] enters a shape, or leaves it from inside."""
+    """Return whether a line of the given length [m] enters a shape or leaves it from inside."""
     if passage.enter > passage.leave:
         return False
     first = passage.enter if passage.enter >= 0.0 else passage.leave

@@ -1,8 +1,8 @@
-"""Triangulation of points, with their covariances, from their pixels in several cameras.
+"""Triangulation of points and their covariances from the points' pixels in several cameras.
 
 A linear solution is refined by Gauss-Newton iterations on the reprojection error (Hartley and
-Zisserman, Multiple View Geometry, 2nd ed., chapter 12). If a gate is given, the search starts from
-the pair of cameras that agrees with the most others, so that wrong detections are rejected.
+Zisserman, Multiple View Geometry, 2nd ed., chapter 12). If a gate is given, only the largest set of
+views that agree with each other is used, so that wrong detections are rejected.
 
 Kernels process one point: projection matrices P (C, 3, 4), pixels z (C, 2), their standard
 deviations sigma (C,) [px], and a mask (C,) of the views to use.
@@ -21,12 +21,12 @@ from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 NEAREST_DEPTH_M = 0.05
 """Minimum depth of points with usable pixels [m]."""
 FURTHEST_PX = 1e5
-"""Greatest pixel coordinate that is accepted as a measurement [px]."""
+"""Maximum absolute pixel coordinate that is accepted as a measurement [px]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Triangulation:
-    """Triangulated points with covariances, NaN where fewer than two views were usable."""
+    """Triangulated points with covariances, which are NaN if fewer than two views were usable."""
 
     points_world: Points3
     """(B, W, J, 3) positions of the points in the world frame [m]."""
@@ -37,7 +37,7 @@ class Triangulation:
 
 
 class Pixel(NamedTuple):
-    """The projection of a point into a camera."""
+    """Projection of a point into the image of a camera."""
 
     u: float
     """Column [px]."""
@@ -48,14 +48,14 @@ class Pixel(NamedTuple):
 
 
 def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.0) -> Triangulation:
-    """Triangulate points by weighted least squares from all views, or from those that agree.
+    """Triangulate points by weighted least squares from all views, or from agreeing views.
 
     Args:
         P: (C, 3, 4) projection matrices.
         px: (B, C, W, J, 2) pixels; NaN where missing.
         sigma_px: (B, C, W, J) standard deviations [px]; only views with finite and positive ones
             are used.
-        gate_sigma: greatest reprojection error of agreeing views, in standard deviations; if 0, all
+        gate_sigma: maximum reprojection error of agreeing views, in standard deviations; if 0, all
             views are used.
 
     Raises:
@@ -134,7 +134,7 @@ def inverse3(a: Floats, out: Floats) -> float:
 
 @kernel
 def pixel_of(camera: Floats, x: float, y: float, z: float) -> Pixel:
-    """Return the pixel and the depth of a point [m] in a camera with a projection matrix (3, 4)."""
+    """Return the pixel and the depth of a point [m] in a camera with projection matrix (3, 4)."""
     depth = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
     u = (camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z + camera[0, 3]) / depth
     v = (camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z + camera[1, 3]) / depth
@@ -143,7 +143,7 @@ def pixel_of(camera: Floats, x: float, y: float, z: float) -> Pixel:
 
 @kernel(makes_arrays=True)
 def linear_point(P: Floats, z: Points2, use: Bools, out: Points3) -> bool:
-    """Compute the point (3,) nearest to the planes of constant u and v of the used views [m].
+    """Compute the linear least-squares point (3,) of the used views [m].
 
     Returns:
         Whether the point exists and is in front of all of these cameras.
@@ -208,7 +208,7 @@ def refine_point(
         n_steps: number of iterations.
 
     Returns:
-        Whether the point is finite, determined by the views and in front of the cameras.
+        Whether the point is finite, determined by the views, and in front of the cameras.
     """
     information, step, jacobian = np.empty((3, 3)), np.empty(3), np.empty((2, 3))
     for _ in range(n_steps):
@@ -243,7 +243,7 @@ def refine_point(
 def point_from_views(
     P: Floats, z: Points2, sigma: Floats, use: Bools, point: Points3, cov: Covariances3
 ) -> int:
-    """Compute the least-squares point (3,) [m] of the used views, and its covariance (3, 3) [m^2].
+    """Compute the least-squares point (3,) [m] of the used views and its covariance (3, 3) [m^2].
 
     Returns:
         The number of used views, or 0 if there is no such point.
@@ -291,8 +291,8 @@ def consensus_point(
         z: (C, 2) pixels.
         sigma: (C,) standard deviations [px].
         ok: (C,) mask of the candidate views.
-        gate_sigma: greatest reprojection error of agreeing views, in standard deviations.
-        point: (3,) output: the point of these views [m].
+        gate_sigma: maximum reprojection error of agreeing views, in standard deviations.
+        point: (3,) output: the point computed from the agreeing views [m].
         cov: (3, 3) output: the covariance of the point [m^2].
         use: (C,) output: the mask of the agreeing views.
 

@@ -16,7 +16,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointAngles, Points2
 
 NEAREST_M = 0.02
-"""Distance from an obstacle below which a ray ends [m]."""
+"""Distance from an obstacle below which a ray counts as ending there [m]."""
 STEPS = 64
 """Maximum number of steps along a ray."""
 
@@ -31,7 +31,7 @@ class GridPoint(NamedTuple):
 
 
 def gaps_m(xs: Floats, ys: Floats, footprints: Floats) -> Floats:
-    """Return the distances of grid points from the nearest footprint.
+    """Return the distance of each grid point from the nearest footprint.
 
     Args:
         xs: (X,) first coordinates of the points [m].
@@ -93,8 +93,8 @@ def _find_shortest(price: Floats, goal_i: int, goal_j: int, cell: float, ways: F
     """Compute the lengths `ways` (X, Y) of shortest paths; see `ways_m`.
 
     The search first covers all reachable points, starting at the goal. It then extends from these
-    to all other points in the order of their distance, which assigns the two halves of a wall to
-    the two sides.
+    to all other points in the order of their distance, so that points inside a wall are assigned to
+    the nearer side of the wall.
     """
     n_x, n_y = price.shape
     order = np.full((n_x, n_y), np.inf)
@@ -159,7 +159,7 @@ def _trace_rays(
     most_m: float,
     ranges: Floats,
 ) -> None:
-    """Compute the lengths `ranges` (B, R) of rays, in steps of the distance to the obstacles."""
+    """Compute the lengths `ranges` (B, R) of rays by sphere tracing."""
     for b in range(len(places)):
         for k in range(len(angles)):
             way, c, s = 0.0, math.cos(angles[k]), math.sin(angles[k])
@@ -221,7 +221,7 @@ def _find_overlaps(capsules: Capsules, radius: Floats, footprints: Floats, overl
 
 @kernel
 def _from_rectangle(x: float, y: float, length: float, width: float) -> float:
-    """Return the distance of a point from a rectangle with these half sides around the origin."""
+    """Return the distance of a point from a rectangle around the origin, given its half sides."""
     return math.hypot(max(abs(x) - length, 0.0), max(abs(y) - width, 0.0))
 
 

@@ -1,1 +1,1 @@
-"""Conversion of motion-capture files to clips that any worker can play."""
+"""Conversion of motion-capture files to clips, for playback by workers of any size."""

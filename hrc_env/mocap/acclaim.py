@@ -1,8 +1,8 @@
-"""Reader of Acclaim files: a skeleton (ASF) and its motion (AMC), as in the CMU database.
+"""Reader of Acclaim files, with skeletons (ASF) and motion (AMC) as in the CMU database.
 
-A bone's rotation in its parent's frame is C M C^-1. C rotates the axes of the file to those of the
-bone ("axis"). M is the rotation by the bone's degrees of freedom, about fixed axes in the order of
-the file.
+The rotation of a bone in its parent's frame is C M C^-1. C rotates the axes of the file to those of
+the bone ("axis" in the file). M is the rotation by the bone's degrees of freedom about fixed axes,
+in the order of the file.
 """
 
 import re
@@ -24,14 +24,14 @@ FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 @dataclass(slots=True)
 class _Bone:
-    """One bone of a skeleton; the root has a zero direction."""
+    """One bone of a skeleton; the direction of the root is zero."""
 
     direction: Floats = field(default_factory=lambda: np.zeros(3))
     """Direction (3,) from the bone's start to its end."""
     length: float = 1.0
     """Length of the bone [unit of the file]."""
     axis: Rotations = field(default_factory=lambda: np.eye(3))
-    """Rotation (3, 3) from the bone's axes to the file's."""
+    """Rotation (3, 3) from the axes of the bone to those of the file."""
     freedoms: tuple[str, ...] = ()
     """Degrees of freedom, in the order of the file."""
 
@@ -51,7 +51,7 @@ class _Skeleton:
     parent: dict[str, str] = field(default_factory=dict)
     """Name of each bone's parent."""
     per_inch: float = 1.0
-    """Length of one inch in the unit of the file (CMU: 0.45)."""
+    """Length of one inch in the unit of the file, 0.45 in the CMU database."""
     is_in_radians: bool = False
     """Whether angles are in radians instead of degrees."""
 
@@ -81,7 +81,10 @@ def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
 
 
 def _find_skeleton(path: Path) -> Path:
-    """Return the ASF file beside an AMC file: of the same name or subject, or the only one."""
+    """Return the ASF file that belongs to an AMC file, from the same folder.
+
+    It has the same name or subject, or is the only ASF file.
+    """
     beside = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf")
     for stem in (path.stem, path.stem.split("_")[0]):
         for candidate in beside:
@@ -97,7 +100,7 @@ def _find_skeleton(path: Path) -> Path:
 
 
 def _read_subject(path: Path) -> str:
-    """Return the subject's number in the CMU database, or "": "2" for 02.asf and 02_01.amc."""
+    """Return the subject's number in the CMU database ("2" for 02.asf and 02_01.amc), or ""."""
     number = re.match(r"0*(\d+)(?=_|$)", path.stem)
     return number[1] if number else ""
 
@@ -133,11 +136,11 @@ def _read_asf(path: Path) -> _Skeleton:
 
 
 def _read_bone(words: list[str], bone: _Bone, is_in_radians: bool, rows: Rows) -> None:
-    """Read one line on a bone; limits and masses are ignored.
+    """Read one line of the definition of a bone; limits and masses are ignored.
 
     Args:
         words: words of the line.
-        bone: bone of the line, which is changed.
+        bone: bone to which the line belongs; it is changed.
         is_in_radians: whether angles are in radians.
         rows: lines of the file, for error messages.
     """
@@ -159,7 +162,7 @@ def _check_skeleton(skeleton: _Skeleton, done: list[str], source: str) -> None:
 
     Args:
         skeleton: content of the file.
-        done: names of the sections that were read.
+        done: names of the sections of the file that were read.
         source: name of the file, for error messages.
     """
     missing = [part for part in ("units", "root", "bonedata", "hierarchy") if part not in done]
@@ -183,9 +186,9 @@ class _Motion(NamedTuple):
     """Content of an AMC file."""
 
     values: dict[str, Floats]
-    """Values (T, freedoms) of every moving bone, by name."""
+    """Values (T, n_freedoms) of each moving bone, by name."""
     notes: tuple[str, ...]
-    """A sentence for each deviation from the format."""
+    """Descriptions of the deviations from the format, one sentence each."""
 
 
 def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
@@ -227,7 +230,7 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
 
 
 def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
-    """Return the bones as nodes at their starts, and the tips of the chains, in inches."""
+    """Return the motion of nodes at the starts of bones and at the tips of chains, in inches."""
     (names, parent, along), values = _list_nodes(skeleton), motion.values
     offset = np.repeat(along[None] / skeleton.per_inch, len(values[ROOT]), axis=0)
     for column, freedom in enumerate(skeleton.bones[ROOT].freedoms):
@@ -256,7 +259,7 @@ def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
 
 
 class _Nodes(NamedTuple):
-    """Bones and chain tips of a skeleton, parents first."""
+    """Bones and chain tips of a skeleton, with parents before their children."""
 
     names: list[str]
     """Name of each node."""
@@ -267,7 +270,7 @@ class _Nodes(NamedTuple):
 
 
 def _list_nodes(skeleton: _Skeleton) -> _Nodes:
-    """Return the bones and chain tips of a skeleton, parents first."""
+    """Return the bones and chain tips of a skeleton, with parents before their children."""
     names, parent, along, tips = [ROOT], [-1], [np.zeros(3)], []
     for node, name in enumerate(names):  # the list grows during the iteration
         children = [child for child, above in skeleton.parent.items() if above == name]
@@ -283,11 +286,11 @@ def _list_nodes(skeleton: _Skeleton) -> _Nodes:
 
 
 def _compose_turns(freedoms: tuple[str, ...], values: Floats, is_in_radians: bool) -> Rotations:
-    """Compose rotations (T, 3, 3) about fixed axes, in the order of application.
+    """Compose the rotations (T, 3, 3) about fixed axes, in the order of application.
 
     Args:
         freedoms: degrees of freedom; translations are ignored.
-        values: values (T, freedoms) of the degrees of freedom.
+        values: values (T, n_freedoms) of the degrees of freedom.
         is_in_radians: whether angles are in radians.
     """
     turned = np.tile(np.eye(3), (len(values), 1, 1))

@@ -1,4 +1,4 @@
-"""Reader of BVH files: a tree of joints with channels, and a row of numbers per frame."""
+"""Reader of BVH files, which contain a tree of joints with channels, and numbers per frame."""
 
 import re
 from collections.abc import Iterator
@@ -16,13 +16,16 @@ from hrc_env.mocap.rows import Rows, separate_numbers, to_number
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "xyz")
 COMMENTS = "#|//"
-"""Regular expression of the signs that begin a comment."""
+"""Regular expression of the characters that begin a comment."""
 LEAST_SHARE = 0.5
-"""Least share of the announced number of frames that a file must contain; judgement."""
+"""Minimum fraction of the announced frames that a file must contain.
+
+The value is an estimate.
+"""
 LIMB = 4
-"""Least number of nodes, including the tip, in the chain of a leg or of a trunk with an arm."""
+"""Minimum number of nodes, including the tip, in a chain of a leg or of a trunk with an arm."""
 NEAR_ZERO = 0.5
-"""Size of a bone's positions relative to its OFFSET below which they are added to the OFFSET."""
+"""Ratio of a bone's positions to its OFFSET below which the positions are added to it."""
 
 
 @dataclass(slots=True)
@@ -47,9 +50,12 @@ class _NodePoses(NamedTuple):
     rotation: Rotations
     """Rotations (T, N, 3, 3)."""
     stated: dict[int, Points3]
-    """OFFSET (3,) of nodes that carry the whole body, in axes with position channels; else 0."""
+    """OFFSET (3,) of nodes that move the whole body, by node.
+
+    It is 0 along axes without position channels.
+    """
     notes: tuple[str, ...]
-    """A sentence for each deviation from the format."""
+    """Descriptions of the deviations from the format, one sentence each."""
 
 
 def read_bvh(path: Path) -> Moving:
@@ -76,7 +82,7 @@ def read_bvh(path: Path) -> Moving:
 
 
 def _read_after(pattern: str, rows: Rows, title: str) -> float:
-    """Return the number after a title on the next line; colon and blanks are optional.
+    """Return the number after a title on the next line; colon and spaces are optional.
 
     Args:
         pattern: regular expression of the title.
@@ -120,7 +126,7 @@ def _read_tree(rows: Rows) -> list[_Node]:
 
 
 def _split_statements(rows: Rows) -> Iterator[list[str]]:
-    """Yield the words of each statement: a line, or a part of a line with braces."""
+    """Yield the words of each statement, which is a line or a part of a line with braces."""
     while True:
         for part in re.split(r"([{}])", " ".join(rows.next("the skeleton"))):
             if words := part.split():
@@ -143,7 +149,7 @@ class _Frames(NamedTuple):
     values: Floats
     """Numbers (T, width)."""
     notes: tuple[str, ...]
-    """A sentence for each deviation from the format."""
+    """Descriptions of the deviations from the format, one sentence each."""
 
 
 def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
@@ -152,7 +158,7 @@ def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
     Args:
         rows: lines of the file.
         width: number of channels.
-        announced: number of frames that the file announces.
+        announced: number of frames according to the header of the file.
     """
     first, lines = rows.at, [separate_numbers(words, width) for words in rows.remaining()]
     if lines and len(lines[-1]) < width:
@@ -189,11 +195,11 @@ def _to_numbers(lines: list[list[str]], source: str) -> Floats:
 
 
 def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses:
-    """Return the nodes' poses in their parents' frames; position channels replace the OFFSET.
+    """Return the poses of nodes in their parents' frames; position channels replace the OFFSET.
 
     Some programs write the positions of bones relative to their OFFSET. Such positions are
     recognized by their small size and added to the OFFSET. This criterion does not apply to the
-    position of the whole body (see `Moving.shift`).
+    position of the whole body, for which `Moving.shift` is used.
 
     Args:
         nodes: nodes of the hierarchy.
@@ -225,7 +231,7 @@ def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses
 
 
 def _find_carriers(parent: Ints) -> set[int]:
-    """Return the nodes that carry the whole body: from the root to the branching of the legs."""
+    """Return the nodes that move the whole body, from the root to the branching of the legs."""
     depth, carriers = np.ones(len(parent), int), set[int]()
     for node in range(len(parent) - 1, 0, -1):
         if parent[node] >= 0:

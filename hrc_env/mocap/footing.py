@@ -11,44 +11,47 @@ from hrc_env.mocap.person import Run, find_runs, smooth
 from hrc_env.mocap.record import Repaired
 
 ANKLE_M = 0.06
-"""Height of the ankle above the tip of a standing foot [m], from the baked bodies."""
+"""Height of the ankle above the tip of a standing foot in the worker models [m]."""
 RESTS_M_S = 0.15
 """Vertical speed of the lower foot below which it is at rest [m/s].
 
-Horizontal speed is ignored, so that recordings with sliding feet are accepted.
+Horizontal speed is ignored in order to accept recordings with sliding feet.
 """
 SMOOTH_S = 0.05
 """Standard deviation of the smoothing of heights [s]."""
 LEAST_S = 0.1
-"""Duration of the shortest rest of a foot [s]."""
+"""Minimum duration of the rest of a foot [s]."""
 FLOOR_SHARE = 20.0
-"""Percentile of the heights of feet at rest that is the floor: people step up more than down."""
+"""Percentile of the heights of feet at rest that is taken as the floor.
+
+It is below the median because people step up more often than down.
+"""
 LEAST_TILT_RAD = 0.015
-"""Least tilt of the floor that is corrected [rad]."""
+"""Minimum tilt of the floor that is corrected [rad]."""
 MOST_TILT_RAD = 0.07
-"""Greatest tilt of the floor that is corrected [rad]."""
+"""Maximum tilt of the floor that is corrected [rad]."""
 EVEN_M = 0.015
-"""Greatest standard deviation of feet at rest from a tilted plane that is corrected [m]."""
+"""Maximum standard deviation of feet at rest from a tilted plane for its correction [m]."""
 APART_M = 1.0
-"""Least extent of feet at rest in a direction in which tilt is corrected [m]."""
+"""Minimum extent of the feet at rest in a direction for the correction of tilt along it [m]."""
 LEVEL_M = 0.08
 """Height of feet at rest relative to the floor beyond which they stand on an object [m]."""
 LEVEL_S = 0.3
-"""Greatest total time for which feet may rest on objects [s]."""
+"""Maximum total time for which feet may rest on objects [s]."""
 AIR_M = 0.10
 """Height of both feet above which a person without a hand on the floor is in the air [m]."""
 AIR_S = 0.7
-"""Duration of the longest jump [s]."""
+"""Maximum duration of a jump [s]."""
 HAND_M = 0.1
-"""Height of the wrist when the hand is on the floor [m]."""
+"""Height of the wrist below which the hand is on the floor [m]."""
 RUN_M_S = 2.5
-"""Speed of a person above which feet need not be at rest [m/s]."""
+"""Speed of a person above which it need not have a foot at rest [m/s]."""
 LEAST_SHARE = 0.1
-"""Least share of the time in which at least one foot is at rest."""
+"""Minimum fraction of the time during which at least one foot must be at rest."""
 FLOOR_M = (-0.03, 0.09)
-"""Range of the height of standing feet's tips for which the file's floor is accepted [m]."""
+"""Range of the height of the tips of standing feet for which the file's floor is accepted [m]."""
 SOLE_M = 0.03
-"""Height of feet's tips above an estimated floor [m]; 0.01 to 0.04 for the baked bodies."""
+"""Assumed height of the tips of feet above the floor [m]; 0.01 to 0.04 in the worker models."""
 ACCEPT = "To play it on a single floor nevertheless: --allow-off-floor (allow_off_floor=True)."
 
 
@@ -64,14 +67,14 @@ class Support(NamedTuple):
 def put_on_floor(
     joints: Points3, fps: float, source: str, at_zero: bool, is_allowed: bool
 ) -> Repaired:
-    """Return joints on a level floor at 0; they are moved only if the file's floor is elsewhere.
+    """Move joints to a level floor at 0, unless the floor of the file is already there.
 
     Args:
         joints: joints (T, 15, 3), upright [m].
         fps: frame rate [Hz].
         source: name of the file, for error messages.
-        at_zero: whether the file's floor is at 0 by convention, so that another floor indicates the
-            skeleton of another person.
+        at_zero: whether the file's floor is at 0 by convention, in which case a different height
+            indicates the skeleton of another person.
         is_allowed: whether faults are accepted.
 
     Raises:
@@ -102,7 +105,7 @@ def put_on_floor(
 
 
 def _is_hanging(joints: Points3) -> bool:
-    """Return whether both hands are above the head for most of the time."""
+    """Return whether both hands are above the head most of the time."""
     hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1)
     return bool(np.median(hands - joints[:, JOINT["nose"], 2]) > 0.0)
 
@@ -121,7 +124,10 @@ def find_support(joints: Points3, fps: float) -> Support:
 
 
 def measure_floor_height(joints: Points3, fps: float) -> float:
-    """Return the height of the tips of feet at rest, or of the lowest ones if none rests [m]."""
+    """Return the height of the tips of feet at rest [m], or of the lowest feet if none is at rest.
+
+    The result is a percentile over time.
+    """
     height, rests = find_support(joints, fps)
     return float(
         np.percentile(height[rests], FLOOR_SHARE) if rests.any() else np.percentile(height, 5.0)
@@ -129,7 +135,7 @@ def measure_floor_height(joints: Points3, fps: float) -> float:
 
 
 def level_floor(joints: Points3, fps: float) -> Repaired:
-    """Return joints rotated so that a slightly tilted floor becomes level."""
+    """Rotate joints to level a slightly tilted floor."""
     height, rests = find_support(joints, fps)
     points = np.column_stack([joints[rests, JOINT["left_hip"], :2], height[rests]])
     if len(points) < 3:
@@ -146,7 +152,7 @@ def level_floor(joints: Points3, fps: float) -> Repaired:
 
 
 def _make_levelling(slope: Floats) -> Rotations:
-    """Return the smallest rotation (3, 3) that takes the plane z = slope . (x, y) to z = 0."""
+    """Return the smallest rotation (3, 3) of the plane z = slope . (x, y) to z = 0."""
     up = np.array([-slope[0], -slope[1], 1.0]) / np.sqrt(1.0 + slope @ slope)
     x, y, z = up
     cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
@@ -154,7 +160,7 @@ def _make_levelling(slope: Floats) -> Rotations:
 
 
 def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
-    """Return a sentence for each way in which the feet are not on one level floor."""
+    """Return sentences on the faults by which the feet are not on one level floor."""
     height, rests = find_support(joints, fps)
     height = height - measure_floor_height(joints, fps)
     faults = []
@@ -183,7 +189,10 @@ def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
 
 
 def _is_running(joints: Points3, height: Floats, fps: float) -> bool:
-    """Return whether the person runs: fast, with a foot near the floor at least every `AIR_S`."""
+    """Return whether the person is running.
+
+    A running person is fast, and has a foot near the floor at least once per `AIR_S`.
+    """
     hip = joints[:, JOINT["left_hip"], :2]
     speed_m_s = np.median(np.linalg.norm(np.diff(hip, axis=0), axis=-1)) * fps
     aloft = max((end - first for first, end in find_runs(height > LEVEL_M)), default=0)

@@ -1,4 +1,4 @@
-"""Initial control vectors from joints by geometry; `retarget.fit_controls` refines them."""
+"""Geometric computation of initial control vectors, which `retarget.fit_controls` refines."""
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import GRIP_M
 
 HEADING_S = 0.25
-"""Standard deviation of the smoothing of the pelvis's direction for the heading [s]."""
+"""Standard deviation of the smoothing of the pelvis's direction, which defines the heading [s]."""
 PELVIS_SHARE = 0.45
-"""Share of the pelvis in the pitch of the trunk, as in `posture.lean`."""
+"""Fraction of the trunk's pitch that is due to the pelvis, as in `posture.lean`."""
 VERTICAL_SHARE = 0.2
-"""Horizontal extent of a foot, relative to its length, below which it heads like the pelvis."""
+"""Horizontal extent of a foot, relative to its length, below which it has the pelvis's heading."""
 NOSE_PITCH_RAD = 0.6
-"""Angle between the nose, seen from mid-shoulder, and the trunk's axis for a level head [rad]."""
+"""Angle at mid-shoulder between the nose and the trunk's axis for a level head [rad]."""
 
 
 def guess_controls(joints: Points3, fps: float, marks: Marks) -> Floats:
     """Estimate control vectors (T, N_CONTROLS) from joints.
 
     Args:
-        joints: desired joints (T, 15, 3) of the worker [m].
+        joints: desired positions (T, 15, 3) of the worker's joints [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
     """
@@ -95,7 +95,9 @@ def _find_swivel(reach: Points3, elbow: Points3, hanging: Floats, outward: Float
 
 
 def _guess_foot(q: Floats, side: int, name: str, joints: Points3, marks: Marks) -> None:
-    """Estimate ankle, heading and pitch of a foot; a kneeling foot may pitch beyond the vertical.
+    """Estimate the ankle position, heading and pitch of a foot.
+
+    A kneeling foot may pitch beyond the vertical.
 
     Args:
         q: control vectors (T, N_CONTROLS), which are changed.

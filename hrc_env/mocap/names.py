@@ -1,4 +1,4 @@
-"""Interpretation of joint names: words of many programs for sides and parts of the body."""
+"""Interpretation of joint names of many programs, by words for sides and parts of the body."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,9 +34,9 @@ SIDED: dict[str, tuple[str, ...]] = {
         "foot",
     ),
 }
-"""Names of each joint without prefixes and sides, the best name first.
+"""Names of each joint without prefixes and sides, in the order of preference.
 
-A side may be before, after or inside a name; "x end" is the tip (End Site) of joint x.
+The word for the side may be before, after or inside a name; "x end" is the End Site of joint x.
 """
 HEAD: tuple[str, ...] = ("head", "skull", "face")
 """Names of the node that rotates with the face."""
@@ -46,9 +46,9 @@ SIDES = {
     **dict.fromkeys(("left", "l", "lft", "lf"), "left"),
     **dict.fromkeys(("right", "r", "rgt", "rt"), "right"),
 }
-"""Side by its word or abbreviation."""
+"""Side of the body, by the word or abbreviation for it."""
 TAILS = ("joint", "jnt", "jt", "bone", "bn", "bend", "skin", "bind")
-"""Meaningless words at the end of a name."""
+"""Words without meaning at the end of a name."""
 OWN = frozenset(
     (
         "fore",
@@ -101,21 +101,21 @@ OWN = frozenset(
         "in",
     )
 )
-"""Words that must not be omitted from a name, because they change its meaning."""
+"""Words that must not be omitted from a name, since they change its meaning."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 CUT = 0.05
-"""Cost of each word that is omitted before a name; a joint's name at index k costs k."""
+"""Cost of each word omitted before a name, relative to one rank in `SIDED`."""
 TAIL = 0.2
-"""Cost of each word that is omitted after a name."""
+"""Cost of each word omitted after a name."""
 TURNED = 0.1
 """Cost of two words in reversed order."""
 
 
 class _Joined(NamedTuple):
-    """Several words joined to one word."""
+    """Several words concatenated to one word."""
 
     word: str
-    """Joined word."""
+    """Concatenated word."""
     cost: float
     """Cost of words that were omitted or reversed."""
 
@@ -126,7 +126,7 @@ class Reading(NamedTuple):
     side: str
     """Side of the body: "left", "right" or ""."""
     word: str
-    """Part of the body, in lowercase without blanks; with " end" for a tip."""
+    """Part of the body, in lowercase without spaces, followed by " end" for a tip."""
     cost: float
     """Cost of words that were omitted or reversed."""
 
@@ -157,7 +157,7 @@ def _split_words(name: str) -> list[str]:
 
 
 def _split_readings(words: list[str], cost: float) -> Iterator[Reading]:
-    """Yield interpretations of words, with a side at any position, and without leading words."""
+    """Yield the interpretations of words, with a side at any position and without leading words."""
     for k in [k for k, word in enumerate(words) if word in SIDES]:
         rest = words[:k] + words[k + 1 :]
         yield from (Reading(SIDES[words[k]], word, cost + more) for word, more in _join_words(rest))
@@ -171,7 +171,7 @@ def _split_readings(words: list[str], cost: float) -> Iterator[Reading]:
 
 
 def _join_words(words: list[str]) -> Iterator[_Joined]:
-    """Yield the words joined to one word, each time with one leading word less."""
+    """Yield the words concatenated to one word, each time with one leading word less."""
     for k in range(len(words)):
         if k and words[k - 1] in OWN:
             return
@@ -181,10 +181,10 @@ def _join_words(words: list[str]) -> Iterator[_Joined]:
 
 
 def find_cost(wanted: Sequence[str], side: str, readings: Sequence[Reading]) -> float:
-    """Return the cost of interpreting a name as one of some words; it is infinite if none matches.
+    """Return the cost of interpreting a name as one of the wanted words; infinite without a match.
 
     Args:
-        wanted: accepted words, the best first.
+        wanted: accepted words, in the order of preference.
         side: side of the body: "left", "right" or "".
         readings: interpretations of the name.
     """
@@ -202,7 +202,7 @@ def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
     An entry may also be the name of a TOML file with such lines.
 
     Raises:
-        ConfigError: an entry has another format, or names an unknown joint.
+        ConfigError: an entry has another format, or its joint is unknown.
     """
     given: dict[str, str] = {}
     for entry in entries:
@@ -222,7 +222,7 @@ def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
 
 
 def find_node(name: object, names: Sequence[str], source: str) -> int:
-    """Return the index of the node with a name; an exact match is preferred to ignoring case."""
+    """Return the index of the node with a name; case is ignored if there is no exact match."""
     for exact in (True, False):
         for node, known in enumerate(names):
             if known == name or (not exact and known.lower() == str(name).lower()):

@@ -1,4 +1,4 @@
-"""Measurements of a recorded person, from which unit and faults are inferred; smoothing."""
+"""Measurement of a recorded person, to infer units and faults, and smoothing of motion."""
 
 from typing import NamedTuple
 
@@ -10,13 +10,16 @@ from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT, JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
 
 MEASURED_SHARE = 0.755
-"""Total length of shank, thigh and trunk as a share of stature, from the baked bodies."""
+"""Total length of shank, thigh and trunk in the worker models, as a fraction of stature."""
 STRANGE = 2.0
-"""Ratio of a bone's length to that of an adult of equal stature beyond which it is an error."""
+"""Maximum ratio of a bone's length to that of an adult of equal stature.
+
+The minimum ratio is half the inverse of this value.
+"""
 
 
 def midpoint(joints: Points3, part: str) -> Points3:
-    """Return the midpoint (..., 3) of the left and the right joint of a pair."""
+    """Return the midpoint (..., 3) between the left and the right joint of a pair."""
     return 0.5 * (joints[..., JOINT[f"left_{part}"], :] + joints[..., JOINT[f"right_{part}"], :])
 
 
@@ -60,7 +63,7 @@ def check_person(joints: Points3, source: str) -> None:
 
 
 def smooth(values: Floats, sigma_frames: float) -> Floats:
-    """Smooth values (T, ...) over time by a Gaussian filter; the ends are extended."""
+    """Smooth values (T, ...) over time by a Gaussian filter, with the end values extended."""
     radius = int(np.ceil(3.0 * sigma_frames))
     if radius < 1:
         return values.copy()
@@ -71,7 +74,7 @@ def resample(values: Floats, fps: float, wanted_fps: float) -> Floats:
     """Resample values (T, ...) to another rate by Catmull-Rom splines.
 
     Args:
-        values: values (T, ...), which are smoothed first if the rate is reduced.
+        values: values (T, ...); they are first smoothed if the rate is reduced.
         fps: rate of the values [Hz].
         wanted_fps: rate of the result [Hz].
     """
@@ -89,12 +92,12 @@ class Run(NamedTuple):
     """A contiguous run of frames."""
 
     first: int
-    """First frame."""
+    """Index of the first frame."""
     end: int
-    """Frame after the last frame."""
+    """Index of the frame after the last frame."""
 
 
 def find_runs(flag: Bools) -> list[Run]:
-    """Return the contiguous runs of True."""
+    """Return the contiguous runs of frames in which a flag is True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flag, [False]])))
     return [Run(*pair) for pair in edges.reshape(-1, 2).tolist()]

@@ -21,7 +21,7 @@ STARTS = {
     "knee": "shank",
     "ankle": "foot",
 }
-"""Segment with its origin at the centre of each joint, by the joint's name without side."""
+"""Segment that has its origin at the centre of a joint, by the joint's name without side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Marks:
     anatomy: Anatomy
     """Measurements of the body."""
     segment: Ints
-    """Segment (15,) that carries each joint."""
+    """Index (15,) of the segment to which each joint is fixed."""
     offset: Floats
     """Position (15, 3) of each joint in the frame of its segment [m]."""
     rest: Points3
@@ -39,9 +39,10 @@ class Marks:
 
 
 def make_marks(body: Body, landmarks: bool) -> Marks:
-    """Return a body's joints, as BlazePose landmarks or as centres of rotation of its bones.
+    """Return the positions of joints on a body.
 
-    Nose and foot tips are BlazePose landmarks in both cases.
+    They are BlazePose landmarks, or centres of rotation of the bones if `landmarks` is False. Nose
+    and foot tips are BlazePose landmarks in both cases.
     """
     segment, offset = body.joint_segment.copy(), body.joint_offset.copy()
     if not landmarks:
@@ -53,7 +54,7 @@ def make_marks(body: Body, landmarks: bool) -> Marks:
 
 
 def locate_joints(q: Floats, marks: Marks) -> Points3:
-    """Return the joints (N, 15, 3) of control vectors (N, N_CONTROLS) [m]."""
+    """Return the positions (N, 15, 3) of the joints for control vectors (N, N_CONTROLS) [m]."""
     poses = pose_segments(q, marks.anatomy)
     arm = poses.rotation[:, marks.segment] @ marks.offset[..., None]
     return poses.position[:, marks.segment] + arm[..., 0]
@@ -82,7 +83,7 @@ def pose_segments(q: Floats, bones: Anatomy) -> SegmentPoses:
 
 @kernel(makes_arrays=True)
 def _pose_each(q: Floats, position: Floats, turn: Floats, matrix: Floats, worker: Worker) -> None:
-    """Write the poses of the segments for each control vector.
+    """Compute the poses of the segments for each control vector.
 
     Args:
         q: control vectors (T, N_CONTROLS).

@@ -20,9 +20,9 @@ from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
 CMU_HZ = 120.0
-"""Frame rate of the AMC files of the CMU database, which do not state it [Hz]."""
+"""Frame rate of the AMC files of the CMU database, which do not contain it [Hz]."""
 LEAST_S = 0.5
-"""Duration of the shortest clip [s]."""
+"""Minimum duration of a clip [s]."""
 
 
 class _Content(NamedTuple):
@@ -37,9 +37,9 @@ class _Content(NamedTuple):
     node_names: tuple[str, ...]
     """Names (15,) of the joints in the file."""
     notes: tuple[str, ...] = ()
-    """A sentence for each guess and each repair."""
+    """Descriptions of the guesses and repairs, one sentence each."""
     rest_up: Floats | None = None
-    """Unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
+    """Unit vector (3,) from hips to shoulders in a standing rest pose; otherwise NaN."""
 
 
 def read_recording(
@@ -55,13 +55,14 @@ def read_recording(
 
     Args:
         path: a .bvh, .amc or .npz file (docs/motion_capture.md).
-        fps: frame rate of the result [Hz]; None for that of the file.
-        source_fps: true frame rate of the file [Hz], if the file states none or a wrong one.
+        fps: frame rate of the result [Hz]; None for the frame rate of the file.
+        source_fps: true frame rate of the file [Hz], if that in the file is missing or wrong.
         skeleton: the .asf file of an .amc file; None to search for it in the same folder.
-        allow_off_floor: whether to accept a person that is not on one level floor (stairs, terrain,
-            long jumps), and to treat the motion as if it were.
-        joints: names of nodes for joints that are not recognized, e.g. {"left_shoulder": "lShldr"}.
-        up: upward axis of the file, such as "+y", if it is not recognized.
+        allow_off_floor: whether a person that is not on one level floor (stairs, terrain, long
+            jumps) is accepted and treated as if it were on a level floor.
+        joints: names of the nodes of joints that are not recognized automatically, such as
+            {"left_shoulder": "lShldr"}.
+        up: upward axis of the file, such as "+y", if it is not recognized automatically.
 
     Returns:
         The person's joints (T, 15, 3) [m], with +z up and the floor at 0, and notes on repairs.

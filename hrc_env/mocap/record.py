@@ -1,4 +1,4 @@
-"""Content of motion-capture files: skeletons as read, and joints in the project's conventions."""
+"""Content of motion-capture files, as skeletons of the files and as joints of this package."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,17 +15,17 @@ class Capture:
     """Joints of a recorded person over time, upright on the floor."""
 
     joints_world: Points3
-    """Joints (T, 15, 3) in the order of `core.skeleton.JOINTS` [m]; +z is up, the floor at 0."""
+    """Joints (T, 15, 3) in the order of `core.skeleton.JOINTS` [m]; z is up and 0 on the floor."""
     fps: float
     """Frame rate [Hz]."""
     are_landmarks: bool
-    """Whether joints are BlazePose landmarks instead of centres of rotation of the bones."""
+    """Whether the joints are BlazePose landmarks instead of centres of rotation of the bones."""
     node_names: tuple[str, ...]
     """Names (15,) of the joints in the file."""
     source: str
     """Name of the file."""
     notes: tuple[str, ...] = ()
-    """A sentence for each guess and each repair."""
+    """Descriptions of the guesses and repairs, one sentence each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Moving:
     """Motion of a skeleton of N nodes over T frames, in the frame and unit of its file."""
 
     names: tuple[str, ...]
-    """Names (N,) in the file; the tip of a chain has the name of its joint with " end" added."""
+    """Names (N,) in the file; the tip of a chain has the name of its joint, followed by " end"."""
     parent: Ints
     """Parent (N,) of each node, -1 for none; parents come before their children."""
     position: Points3
@@ -41,16 +41,16 @@ class Moving:
     rotation: Rotations
     """Rotations (T, N, 3, 3) file_from_node."""
     rest: Points3
-    """Origins (N, 3) of the nodes if all rotations are zero [unit of the file]."""
+    """Origins (N, 3) of the nodes in the pose without rotations [unit of the file]."""
     fps: float
-    """Frame rate [Hz]; NaN if the format does not state it."""
+    """Frame rate [Hz]; NaN if the format does not contain it."""
     shift: Points3
-    """Displacement (T, 3) of all nodes if the body's position is relative to its OFFSET.
+    """Displacement (T, 3) of all nodes if the position in the file is relative to the OFFSET.
 
-    It is in the unit of the file, and not included in `position`.
+    It is in the unit of the file, and is not included in `position`.
     """
     notes: tuple[str, ...] = ()
-    """A sentence for each guess and each repair."""
+    """Descriptions of the guesses and repairs, one sentence each."""
 
 
 class Repaired(NamedTuple):
@@ -59,7 +59,7 @@ class Repaired(NamedTuple):
     joints: Points3
     """Joints (T, 15, 3)."""
     notes: tuple[str, ...]
-    """A sentence for each change."""
+    """Descriptions of the changes, one sentence each."""
 
 
 class TreePose(NamedTuple):
@@ -90,6 +90,6 @@ def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
 
 
 def place_at_rest(parent: Ints, offset: Floats) -> Points3:
-    """Return the origins (N, 3) of a tree's nodes if all rotations are zero."""
+    """Return the origins (N, 3) of a tree's nodes in the pose without rotations."""
     rotation = np.tile(np.eye(3), (1, len(offset), 1, 1))
     return compose_tree(parent, offset[None], rotation).position[0]

@@ -1,4 +1,4 @@
-"""Repair of unambiguous faults in motion-capture files; other faults raise an error."""
+"""Repair of unambiguous faults in motion-capture files; other faults raise `ConfigError`."""
 
 from typing import NamedTuple
 
@@ -28,29 +28,32 @@ UNITS: dict[str, float] = {
     "centimetres": 0.01,
     "millimetres": 0.001,
 }
-"""Units of length in files [m]; the unit is inferred from the person's stature."""
+"""Units of length in files [m], of which one is inferred from the person's stature."""
 LONGEST_GAP_S = 0.25
-"""Longest time for which a joint may be missing [s]: about half a step; judgement."""
+"""Maximum time for which a joint may be missing [s].
+
+The value is an estimate, about the duration of half a step.
+"""
 STEADY = 0.8
-"""Least component of the mean direction from ankles to shoulders along the upward axis."""
+"""Minimum component of the mean direction from ankles to shoulders along the upward axis."""
 STRAIGHT = 0.9
-"""Least component of a standing person's direction from ankles to shoulders along an axis."""
+"""Minimum component, along an axis, of the ankle-to-shoulder direction of a standing person."""
 UPRIGHT_SHARE = 0.5
-"""Least vertical component of the direction from ankles to shoulders of an upright person."""
+"""Minimum vertical component of the ankle-to-shoulder direction of an upright person."""
 BEGIN = 5
-"""Number of initial frames that are averaged, and least number of standing or upright frames."""
+"""Number of initial frames that are averaged; minimum number of standing or upright frames."""
 ON_FLOOR = 0.15
-"""Greatest ankle height of a person on the file's floor, as a share of stature."""
+"""Maximum ankle height of a person on the file's floor, as a fraction of stature."""
 OFF_FLOOR = 0.25
-"""Least ankle height of a person off the file's floor, as a share of stature."""
+"""Minimum ankle height of a person off the file's floor, as a fraction of stature."""
 KNEES = 0.1
-"""Greatest mean bend of the knees for straight legs, as a share of a shank."""
+"""Maximum mean bend of straight legs at the knees, as a fraction of the length of a shank."""
 JUMP = 6.0
-"""Ratio of the first frame's jump to later ones above which the first frame is a rest pose."""
+"""Ratio of the jump after the first frame to later ones above which this frame is a rest pose."""
 AFTER = 6
-"""Number of later frames with which the first frame's jump is compared."""
+"""Number of later frames used for the comparison with the jump after the first frame."""
 JUMP_M = 0.03
-"""Least mean movement of the joints after a rest pose in the first frame [m]."""
+"""Minimum mean displacement of the joints after a rest pose in the first frame [m]."""
 UPRIGHT = {
     "+x": about_axis("y", -np.pi / 2),
     "-x": about_axis("y", np.pi / 2),
@@ -58,7 +61,7 @@ UPRIGHT = {
     "-y": about_axis("x", -np.pi / 2),
     "-z": about_axis("x", np.pi),
 }
-"""Rotations that take each axis to +z."""
+"""Rotation that aligns each axis with +z, by the name of the axis."""
 
 
 class Upward(NamedTuple):
@@ -67,7 +70,7 @@ class Upward(NamedTuple):
     given: str | None = None
     """Name of the axis, such as "+y", if it is specified explicitly."""
     at_rest: Floats | None = None
-    """Unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
+    """Unit vector (3,) from hips to shoulders in a standing rest pose; otherwise NaN."""
 
 
 def repair_joints(
@@ -78,7 +81,7 @@ def repair_joints(
     off_floor: bool = False,
     upward: Upward | None = None,
 ) -> Repaired:
-    """Return joints that are complete, in metres, upright, not mirrored and on the floor.
+    """Repair joints to be complete, in metres, upright, not mirrored and on the floor.
 
     A rest pose at the beginning is removed.
 
@@ -86,8 +89,8 @@ def repair_joints(
         joints: joints (T, 15, 3) in the frame and unit of the file; missing joints are NaN.
         fps: frame rate [Hz].
         source: name of the file, for error messages.
-        at_zero: whether the file's floor is at 0 by convention, see `footing.put_on_floor`.
-        off_floor: whether a person that is not on one level floor is accepted.
+        at_zero: whether the file's floor is at 0 by convention, as in `footing.put_on_floor`.
+        off_floor: whether to accept a person that is not on one level floor.
         upward: information on the upward axis.
 
     Raises:
@@ -105,7 +108,7 @@ def repair_joints(
 
 
 def add_shift(joints: Points3, shift: Points3) -> Repaired:
-    """Displace joints by `shift` (T, 3) if the feet are on a floor at 0 only with this shift.
+    """Displace joints by `shift` (T, 3) if this is required for feet on a floor at 0.
 
     Joints and shift are in the frame and unit of the file.
     """
@@ -158,7 +161,7 @@ def convert_to_metres(joints: Points3, source: str) -> Repaired:
 
 
 def turn_upright(joints: Points3, source: str, upward: Upward | None = None) -> Repaired:
-    """Rotate joints so that the person stands along +z."""
+    """Rotate joints to let the person stand along +z."""
     given, at_rest = upward or Upward()
     name = _find_upward_axis(joints, source, at_rest) if given is None else given
     name = name if name[:1] in ("+", "-") else f"+{name}"
@@ -173,8 +176,9 @@ def turn_upright(joints: Points3, source: str, upward: Upward | None = None) -> 
 def _find_upward_axis(joints: Points3, source: str, at_rest: Floats | None) -> str:
     """Return the name of the upward axis.
 
-    It is that of the rest pose if the person stands along it for some frames (as before a fall).
-    Otherwise it is the mean direction of the body, or that at the beginning.
+    It is the axis of the rest pose if the person stands along it in some frames (as before a fall).
+    Otherwise it is the axis nearest to the direction of the body, averaged over all frames or over
+    the first frames.
     """
     way = midpoint(joints, "shoulder") - midpoint(joints, "ankle")
     way /= np.linalg.norm(way, axis=-1, keepdims=True)
@@ -207,7 +211,7 @@ def _make_unit_vector(axis: str) -> Floats:
 
 
 def undo_mirroring(joints: Points3, source: str) -> Repaired:
-    """Undo an exchange of two axes, or of left and right, in joints."""
+    """Undo a swap of two axes, or of left and right, in joints."""
     feet, knees = _measure_forward(joints)
     if feet > 0.0 and knees > -KNEES:
         return Repaired(joints, ())
@@ -222,18 +226,19 @@ def undo_mirroring(joints: Points3, source: str) -> Repaired:
 
 
 class _Forward(NamedTuple):
-    """Forward components of feet and knees; they are negative for the mirror image of a person."""
+    """Forward components of feet and knees, negative for the mirror image of a person."""
 
     feet: float
-    """Median forward component of the feet, as a share of their length."""
+    """Median forward component of the feet, as a fraction of their length."""
     knees: float
-    """Mean forward bend of the knees, as a share of a shank."""
+    """Mean forward bend of the knees, as a fraction of the length of a shank."""
 
 
 def _measure_forward(joints: Points3) -> _Forward:
-    """Return the forward components of feet and knees; forward is inferred from left and up.
+    """Return the forward components of feet and knees, with forward inferred from left and up.
 
-    Only upright frames count. With fewer than `BEGIN` such frames, the trunk's axis replaces up.
+    Only upright frames are used. With fewer than `BEGIN` such frames, all frames are used and the
+    trunk's axis replaces the upward axis.
     """
     way = midpoint(joints, "shoulder") - midpoint(joints, "ankle")
     upright = way[:, 2] > UPRIGHT_SHARE * np.linalg.norm(way, axis=-1)
@@ -252,16 +257,16 @@ def _measure_forward(joints: Points3) -> _Forward:
 
 
 class FirstFrame(NamedTuple):
-    """Beginning of the motion in a recording."""
+    """First frame of the motion in a recording."""
 
     frame: int
-    """First frame of the motion."""
+    """Index of the first frame of the motion."""
     notes: tuple[str, ...]
-    """A sentence if a frame is removed."""
+    """Description of the removal of a frame, if one is removed."""
 
 
 def skip_rest_pose(joints: Points3) -> FirstFrame:
-    """Return the motion's first frame: 1 if frame 0 is a rest pose (often a T-pose), else 0."""
+    """Return the first frame of the motion: 1 if frame 0 is a rest pose (T-pose), otherwise 0."""
     shape = joints - joints[:, [JOINT["left_hip"]]]
     jumps = np.linalg.norm(np.diff(shape, axis=0), axis=-1).mean(-1)
     if jumps[0] > max(JUMP_M, JUMP * jumps[1:AFTER].max(initial=0.0)):

@@ -1,8 +1,8 @@
-"""Retargeting of a recording to a clip of a worker, and the remaining errors of the joints.
+"""Retargeting of a recording to a clip of a worker, and evaluation of the remaining errors.
 
 Paths scale with the legs; trunk, arms and head keep their directions, with the worker's lengths.
-Damped least squares determine the control vector of each frame. Columns that 15 joints do not
-determine are held near usual values and near those of adjacent frames.
+The control vector of each frame is fitted by damped least squares. Columns that the 15 joints do
+not determine are regularized towards usual values and towards those of adjacent frames.
 """
 
 from collections.abc import Callable
@@ -23,21 +23,21 @@ from hrc_env.motion.clip import Clip, move_to_origin
 from hrc_env.worker.body import Body, load_body
 
 STILL_M_S = 0.15
-"""Speed below which an ankle may stand [m/s]."""
+"""Speed of an ankle below which the foot may stand on the floor [m/s]."""
 LOW_SHARE = 40.0
-"""Percentile of an ankle's heights below which it may stand."""
+"""Percentile of an ankle's heights below which the foot may stand on the floor."""
 OnProgress: TypeAlias = Callable[[float], None]
-"""Callback that receives each increase of the completed share of the work."""
+"""Callback that receives each increase of the completed fraction of the work."""
 ROUNDS = 12
 """Number of iterations of the fit; after eight it changes by less than a millimetre."""
 FRAMES = 256
-"""Number of frames that are fitted in one batch."""
+"""Number of frames fitted in one batch."""
 STEP = 1e-4
 """Step of the finite differences [m or rad]."""
 FARTHEST = 0.25
-"""Greatest change of a column in one iteration [m or rad]."""
+"""Maximum change of a column in one iteration [m or rad]."""
 SMOOTH_S = 0.05
-"""Standard deviation of the smoothing towards which columns are pulled [s]."""
+"""Standard deviation of the smoothing that yields the values for regularization [s]."""
 
 WEIGHT: dict[str, float] = {
     "nose": 0.7,
@@ -49,7 +49,10 @@ WEIGHT: dict[str, float] = {
     "ankle": 3.0,
     "foot": 0.7,
 }
-"""Weight of the error of each joint; judgement: feet and hands touch objects."""
+"""Weight of the error of each joint.
+
+The values are estimates, larger for feet and hands because these touch objects.
+"""
 PULL: dict[int, float] = {
     c.PELVIS_PITCH: 0.05,
     c.SPINE_FLEX: 0.02,
@@ -62,9 +65,9 @@ PULL: dict[int, float] = {
     c.SWIVEL: 0.01,
     c.SWIVEL + 1: 0.01,
 }
-"""Joint error that is equivalent to a column's deviation from its usual value [m/rad]."""
+"""Joint error equivalent to a unit deviation of a column from its usual value [m/rad]."""
 SLIGHT = 1e-3
-"""Value of `PULL` for every other column [m/rad]."""
+"""Value of `PULL` for all other columns [m/rad]."""
 FITTED = np.array(
     [c.ROOT_X, c.ROOT_Y, *range(c.PELVIS_Z, c.N_BLENDED)]
     + [c.ANKLE + 6 * side + k for side in range(2) for k in range(5)]
@@ -83,7 +86,7 @@ class RetargetError:
     scale: float
     """Size of the worker relative to the person."""
     slip_m_s: float
-    """95th percentile of the speed of standing feet's balls [m/s]; NaN if no foot stands."""
+    """95th percentile of the speed of the balls of standing feet [m/s]; NaN if no foot stands."""
 
 
 class Retargeted(NamedTuple):
@@ -96,10 +99,10 @@ class Retargeted(NamedTuple):
 
 
 class Alignment(NamedTuple):
-    """Best similarity transformation between two recordings."""
+    """Least-squares similarity transformation between two recordings."""
 
     scale: float
-    """Size of the second recording relative to the first."""
+    """Size of the second recording, divided by that of the first."""
     distance_m: Floats
     """Distances (T, 15) between the joints after the transformation [m]."""
 
@@ -113,8 +116,9 @@ def retarget(
 
     Args:
         capture: recording, from `read_recording`.
-        body: body or name of a worker; other workers can play the clip, too, scaled to their size.
-        on_progress: called with each increase of the completed share of the work.
+        body: body or name of a worker. The clip, scaled to their size, can be played by other
+            workers, too.
+        on_progress: called with each increase of the completed fraction of the work.
 
     Returns:
         The clip, and the distances between the worker's joints and the recorded ones [m].
@@ -138,9 +142,9 @@ def retarget(
 
 
 def align(source: Points3, done: Points3) -> Alignment:
-    """Return the best similarity transformation between two recordings (T, 15, 3).
+    """Return the least-squares similarity transformation between two recordings (T, 15, 3).
 
-    The method is by Umeyama, IEEE PAMI 13(4), 1991.
+    The method is that of Umeyama, IEEE PAMI 13(4), 1991.
     """
     a, b = source.reshape(-1, 3), done.reshape(-1, 3)
     a0, b0 = a - a.mean(0), b - b.mean(0)
@@ -193,7 +197,7 @@ def scale_joints(joints: Points3, fps: float, marks: Marks) -> Points3:
 
 
 def _set_pair(target: Points3, part: str, centre: Points3, source: Points3, rest: Points3) -> None:
-    """Set a pair of joints about its midpoint, along the person's axis at the worker's width.
+    """Place a pair of joints about its midpoint, along the person's axis, at the worker's width.
 
     Args:
         target: joints (T, 15, 3), which are changed.
@@ -208,7 +212,7 @@ def _set_pair(target: Points3, part: str, centre: Points3, source: Points3, rest
 
 
 def _set_length(way: Points3, metres: float) -> Points3:
-    """Return vectors of the same directions, scaled to a length [m]."""
+    """Scale vectors to a given length [m]."""
     return way * (metres / np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9))
 
 
@@ -224,7 +228,7 @@ def _find_standing(ankle: Points3, fps: float) -> Bools:
 
 
 def _adapt_foot(way: Points3, standing: Bools, rest: Floats) -> Points3:
-    """Return the vector (T, 3) from ankle to foot tip like the person's, but flat in stance."""
+    """Return the vector (T, 3) from ankle to foot tip, as for the person but flat in stance."""
     level = np.hypot(way[:, 0], way[:, 1])
     pitch = np.arctan2(way[:, 2], level)
     flat = np.arctan2(rest[2], np.hypot(rest[0], rest[1]))
@@ -240,10 +244,10 @@ def fit_controls(
     """Fit the control vectors (T, N_CONTROLS) of a worker to given joints.
 
     Args:
-        joints: desired joints (T, 15, 3) of the worker [m].
+        joints: desired positions (T, 15, 3) of the worker's joints [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
-        on_progress: called with each increase of the completed share of the work.
+        on_progress: called with each increase of the completed fraction of the work.
     """
     q = guess_controls(joints, fps, marks)
     weight = np.array([WEIGHT[joint.split("_")[-1]] for joint in JOINTS])[:, None]
@@ -258,7 +262,7 @@ def fit_controls(
 
 
 def _find_usual(q: Floats, fps: float) -> Floats:
-    """Return the values (T, F) towards which the fitted columns are pulled."""
+    """Return the values (T, F) towards which the fitted columns are regularized."""
     bow = q[:, c.PELVIS_PITCH] + q[:, c.SPINE_FLEX]
     near = smooth(q, SMOOTH_S * fps)
     near[:, c.PELVIS_PITCH], near[:, c.SPINE_FLEX] = PELVIS_SHARE * bow, (1 - PELVIS_SHARE) * bow
@@ -272,10 +276,10 @@ def _improve(
 
     Args:
         q: control vectors (n, N_CONTROLS), which are changed.
-        joints: desired joints (n, 15, 3) of the worker [m].
-        usual: values (n, F) towards which the fitted columns are pulled.
+        joints: desired positions (n, 15, 3) of the worker's joints [m].
+        usual: values (n, F) towards which the fitted columns are regularized.
         weight: weight (15, 1) of each joint.
-        pull: strength (F,) of the pull.
+        pull: strength (F,) of the regularization of each column.
         marks: joints of the worker's body.
     """
     n, f = len(q), len(FITTED)

@@ -1,4 +1,4 @@
-"""Lines of motion-capture text files, in any encoding and with any decimal sign."""
+"""Reader of the lines of motion-capture text files, with any encoding and decimal separator."""
 
 import codecs
 import math
@@ -15,11 +15,11 @@ MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-"""Byte order marks and the encodings that they indicate."""
+"""Byte order marks and the corresponding encodings."""
 INSPECTED = 400
 """Number of initial bytes of a file from which UTF-16 without a mark is recognized."""
 NO_NUMBER = re.compile(r"[-+]?(1\.#\w+|nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
-"""Regular expression of missing values: not a number, or not finite."""
+"""Regular expression of missing values, which are NaN or infinite."""
 
 
 def decode(data: bytes) -> str:
@@ -38,10 +38,11 @@ def decode(data: bytes) -> str:
 
 
 def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str]:
-    """Split words into numbers with decimal points; "," and ";" may be separators.
+    """Split words into numbers with decimal points; "," and ";" may separate numbers.
 
-    A comma is a decimal sign if this results in `count` numbers, else a separator. If the count is
-    unknown, a comma is a separator if a word has two commas, or a comma and a point.
+    A comma is interpreted as a decimal separator if this results in `count` numbers, otherwise it
+    separates numbers. If the count is unknown, it separates numbers if a word contains two commas,
+    or a comma and a point.
     """
     if not any("," in word or ";" in word for word in words):
         return list(words)
@@ -54,7 +55,7 @@ def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str
 
 
 def to_number(word: str) -> float:
-    """Convert a word to a number, NaN for a missing value; raise `ValueError` for other words."""
+    """Convert a word to a number, or NaN if it is missing; raise `ValueError` for other words."""
     return math.nan if NO_NUMBER.fullmatch(word) else float(word)
 
 

@@ -23,9 +23,9 @@ CHAINS = tuple(
 )
 """Joints of each limb; each joint is a descendant of the one before in the tree."""
 CHOICES = 6
-"""Number of candidate nodes for a joint, the best by name."""
+"""Maximum number of candidate nodes for a joint."""
 NOSE_SHARE = 0.065
-"""Distance of the nose ahead of the head's joint, as a share of stature of the baked bodies."""
+"""Distance of the nose ahead of the head's joint in the worker models, divided by stature."""
 STANDS = -0.7
 """Cosine of the angle between trunk and thighs below which a rest pose is a standing pose."""
 
@@ -35,15 +35,15 @@ class JointNodes:
     """Nodes of a skeleton that represent the joints."""
 
     node: dict[str, int]
-    """Index of the node of each joint; the nose is contained only if the file has one."""
+    """Index of the node of each joint; the nose is included only if the file contains it."""
     head: int
     """Index of the node that rotates with the face."""
     notes: tuple[str, ...] = ()
-    """A sentence for each joint that was recognized by the skeleton's structure, not its name."""
+    """Descriptions of the joints recognized by the skeleton's structure, one sentence each."""
 
 
 class _Candidate(NamedTuple):
-    """A node that may represent a joint, judging by its name."""
+    """A node that may represent a joint according to its name."""
 
     cost: float
     """Cost of interpreting the node's name as that of the joint."""
@@ -95,7 +95,7 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
 
 
 def _list_candidates(joint: str, readings: list[list[Reading]]) -> list[_Candidate]:
-    """Return the nodes that may represent a joint by their names, the best first."""
+    """Return the nodes that may represent a joint according to their names, by increasing cost."""
     side, _, part = joint.partition("_")
     words, side = (SIDED[part], side) if part else ((joint,), "")
     costs = [find_cost(words, side, ways) for ways in readings]
@@ -113,7 +113,10 @@ def _list_ancestors(node: int, parent: list[int]) -> list[int]:
 def _choose_chain(
     chain: tuple[str, ...], known: dict[str, list[_Candidate]], parent: list[int]
 ) -> dict[str, int]:
-    """Return the nodes of a limb's joints at least cost, each below the one before; or no nodes.
+    """Return the nodes of a limb's joints with the least total cost, by joint.
+
+    Each node must be a descendant of the previous one. If there are no such nodes, the result is
+    empty.
 
     Args:
         chain: joints of the limb.
@@ -134,7 +137,7 @@ def _choose_chain(
 def _infer_middle_joints(
     known: dict[str, list[_Candidate]], names: tuple[str, ...], parent: list[int]
 ) -> Iterator[str]:
-    """Infer elbows and knees without a known name on both sides, and yield a sentence for each.
+    """Infer elbows and knees that have no known name on either side, and yield a note on each.
 
     The only node between shoulder and wrist, or between hip and ankle, becomes the candidate.
 
@@ -163,14 +166,14 @@ def _infer_middle_joints(
 
 
 def _find_head(readings: list[list[Reading]]) -> int | None:
-    """Return the node with the name of a head, if there is one."""
+    """Return the node with a name of the head, or None if there is none."""
     costs = [find_cost(HEAD, "", ways) for ways in readings]
     best = int(np.argmin(costs))
     return best if costs[best] < np.inf else None
 
 
 def _find_top(nodes: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
-    """Return the last node of the unique central branch above the shoulders, if there is one.
+    """Return the last node of the central branch above the shoulders, or None if it is not unique.
 
     Args:
         nodes: nodes of the joints.
@@ -197,7 +200,7 @@ def _find_top(nodes: dict[str, int], names: tuple[str, ...], parent: list[int]) 
 
 
 def extract_joints(moving: Moving, nodes: JointNodes) -> Points3:
-    """Return the joints (T, 15, 3) in the file's frame and unit; a missing nose is constructed."""
+    """Return the joints (T, 15, 3) in the file's frame and unit; a missing nose is estimated."""
     order = [nodes.node.get(joint, nodes.head) for joint in JOINTS]
     joints = moving.position[:, order].copy()
     if JOINTS[0] not in nodes.node:
@@ -209,7 +212,7 @@ def extract_joints(moving: Moving, nodes: JointNodes) -> Points3:
 
 
 def find_rest_up(moving: Moving, nodes: JointNodes) -> Points3:
-    """Return the unit vector (3,) from hips to shoulders in a standing rest pose, else NaN."""
+    """Return the unit vector (3,) from hips to shoulders in a standing rest pose, otherwise NaN."""
     rest = moving.rest[[nodes.node.get(joint, nodes.head) for joint in JOINTS]]
     if not _is_standing(rest):
         return np.full(3, np.nan)
@@ -220,8 +223,8 @@ def find_rest_up(moving: Moving, nodes: JointNodes) -> Points3:
 def _find_face_direction(joints: Points3, moving: Moving, rest: Points3, head: int) -> Floats:
     """Return the face's direction (3,) in the head's frame.
 
-    It is taken from the rest pose if that is a standing pose, else from the trunk's mean forward
-    direction in the motion.
+    If the rest pose is a standing pose, the direction is determined from it, otherwise from the
+    mean forward direction of the trunk in the motion.
 
     Args:
         joints: joints (T, 15, 3).
@@ -237,7 +240,7 @@ def _find_face_direction(joints: Points3, moving: Moving, rest: Points3, head: i
 
 
 def _is_standing(rest: Points3) -> bool:
-    """Return whether a rest pose (15, 3) has its legs below the trunk and its shoulders apart."""
+    """Return whether a rest pose (15, 3) has legs below the trunk and separate shoulders."""
     if rest.shape != (N_JOINTS, 3):
         return False
     trunk = midpoint(rest, "shoulder") - midpoint(rest, "hip")
@@ -248,7 +251,7 @@ def _is_standing(rest: Points3) -> bool:
 
 
 def _find_forward(joints: Points3) -> Points3:
-    """Return unit vectors (..., 3) forward of a trunk; the feet determine the sign."""
+    """Return the forward unit vectors (..., 3) of a trunk; the feet determine the sign."""
     trunk = midpoint(joints, "shoulder") - midpoint(joints, "hip")
     ahead = np.cross(span(joints, "shoulder") + span(joints, "hip"), trunk)
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)

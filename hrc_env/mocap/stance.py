@@ -1,7 +1,8 @@
 """Detection of standing feet in a fitted motion, and their fixation against sliding.
 
-A foot stands while its footprint, the ankle's pose if the foot were flat, is at rest. The footprint
-is then set to one pose, and the correction fades out in the swings before and after.
+The footprint is the pose that the ankle would have if the foot were flat. A foot stands while its
+footprint is at rest. The footprint is then fixed at one pose, and the correction decreases to zero
+in the swings before and after.
 """
 
 from typing import NamedTuple
@@ -18,30 +19,30 @@ from hrc_env.motion.curves import decay
 from hrc_env.worker.body import SEGMENT
 
 RESTS_M_S = 0.2
-"""Speed below which a footprint is at rest [m/s]; small steps have 0.3 m/s, strides 2 m/s."""
+"""Speed below which a footprint is at rest [m/s]; it is 0.3 in small steps and 2 in strides."""
 LEAST_S = 0.1
-"""Duration of the shortest stance, and twice that of the shortest swing [s]."""
+"""Minimum duration of a stance, and twice that of a swing [s]."""
 FADE_S = 0.25
-"""Time in which a correction fades out in a swing [s]."""
+"""Time in which a correction decreases to zero in a swing [s]."""
 SMOOTH_S = 0.02
-"""Standard deviation of the smoothing of footprints, against jitter in recordings [s]."""
+"""Standard deviation of the smoothing of footprints, which suppresses jitter [s]."""
 FLOOR_M = 0.06
-"""Height below which a foot at rest stands on the floor and not on an object [m]."""
+"""Height below which a foot at rest stands on the floor instead of on an object [m]."""
 FLAT_RAD = 0.01
 """Upward pitch of the toes beyond which a foot stands on its heel [rad]."""
 
 
 class LockedFeet(NamedTuple):
-    """Control vectors with standing feet that do not slide."""
+    """Control vectors in which standing feet do not slide."""
 
     controls: Floats
     """Control vectors (T, N_CONTROLS)."""
     stands: Bools
-    """Mask (T, 2) of whether the left and the right foot stand."""
+    """Mask (T, 2) of the frames in which the left and the right foot stand."""
 
 
 def lock_feet(q: Floats, fps: float, size: Floats) -> LockedFeet:
-    """Fix the standing feet in control vectors, so that they do not slide.
+    """Fix the standing feet in control vectors to prevent sliding.
 
     Args:
         q: control vectors (T, N_CONTROLS).
@@ -66,7 +67,7 @@ def lock_feet(q: Floats, fps: float, size: Floats) -> LockedFeet:
 
 
 def measure_slip(q: Floats, stands: Bools, fps: float, anatomy: Anatomy) -> Floats:
-    """Return the horizontal speeds of standing feet's balls, one per frame and foot [m/s].
+    """Return the horizontal speeds of the balls of standing feet, one per frame and foot [m/s].
 
     Args:
         q: control vectors (T, N_CONTROLS).
@@ -98,7 +99,7 @@ def _find_stances(footprint: Floats, fps: float) -> list[Run]:
 def _correct_footprints(
     footprint: Floats, stances: list[Run], fps: float, floor_m: float
 ) -> Floats:
-    """Return corrections (T, 4) that fix footprints in each stance and fade out in the swings.
+    """Return corrections (T, 4) that fix footprints in stances and decrease to zero in swings.
 
     Args:
         footprint: footprint (T, 4) of a foot: x, y, z [m], heading [rad].
@@ -122,7 +123,7 @@ def _correct_footprints(
 
 
 def _fade(n: int, value: Floats, rate: Floats, fps: float) -> Floats:
-    """Return values (n, 4) that decay from the value in the frame before to zero.
+    """Return values (n, 4) that decay to zero from the value in the previous frame.
 
     Args:
         n: number of frames.

@@ -1,1 +1,1 @@
-"""Workers' motion: from behaviour and activities to control vectors and 22 body segments."""
+"""Simulation of the workers' motion, from behaviour and activities to 22 body segments."""

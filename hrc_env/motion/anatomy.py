@@ -1,4 +1,4 @@
-"""Bones of a worker for the kinematics: offsets and frames at rest, and body dimensions."""
+"""Bones of a worker for the kinematics, with offsets and frames at rest, and body dimensions."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,11 +9,11 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.worker.body import N_SEGMENTS, PARENT, Body
 
 CHEST, HEAD = 3, 5
-"""Segments of the trunk to which limbs and gaze refer."""
+"""Indices of the chest, which carries the arms, and of the head."""
 LEFT, SIDE_STRIDE = 6, 8
-"""First segment of the left side, and number of segments of a side (order of `worker.body`)."""
+"""First segment of the left side, and number of segments per side, as ordered in `worker.body`."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
-"""Segments of one side, relative to its first segment."""
+"""Segments of one side of the body, counted from its first segment."""
 
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
@@ -26,20 +26,20 @@ the pelvis, of the ball ahead of and above the ankle, and of the heel ahead of t
 length of the upper arm [m].
 """
 ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
-"""Capsules on which a lying trunk rests."""
+"""Names of the capsules on which a lying trunk rests."""
 N_ROUND = 2 * len(ROUND)
-"""Number of ends of the capsules `ROUND`; those of the shoulders are attached to the chest."""
+"""Number of ends of the capsules `ROUND`; the shoulder capsules are attached to the chest."""
 
 GRIP_M = 0.08
-"""Distance of the grip beyond the wrist [m]; half a hand."""
+"""Distance of the grip from the wrist [m], about half the length of a hand."""
 HEEL_M = -0.045
-"""Position of the heel's contact ahead of the ankle [m]; a quarter of a foot behind it."""
+"""Position of the heel's floor contact ahead of the ankle [m]; negative because it is behind."""
 FOREARM_TWIST_RAD = 0.15
-"""Outward twist of the forearm from the rest pose [rad]; a hanging palm faces the thigh."""
+"""Outward twist of the forearm from the rest pose [rad], with which the palm faces the thigh."""
 HAND_TWIST_RAD = 0.35
 """Outward twist of the hand about the forearm from the rest pose [rad]."""
 STAND_SHARE = 0.994
-"""Height of the standing hip as a share of leg length; the knees are just unlocked."""
+"""Height of the hip in standing with slightly bent knees, as a fraction of leg length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +49,18 @@ class Anatomy:
     offset: Floats
     """Origin (22, 3) of each segment in its parent's frame at rest [m]."""
     frame: Floats
-    """Axes (22, 3, 3) of each limb bone at rest, as rows bone, hinge x bone, hinge; else zero."""
+    """Axes (22, 3, 3) of each limb bone at rest, as rows (bone, hinge x bone, hinge).
+
+    They are zero for other segments.
+    """
     lengths: Floats
-    """Body dimensions (12,) [m]; the constants above name the columns."""
+    """Body dimensions (12,) [m], with the columns described at `N_SIZES`."""
     trunk_ends: Floats
     """Ends (12, 5) of the capsules `ROUND`: segment, position (3) in its frame [m], radius [m]."""
 
 
 def measure_bodies(bodies: Body) -> Anatomy:
-    """Return the constants (N, ...) of N bodies, each as `measure_body` returns them."""
+    """Return the constants (N, ...) of N bodies, computed by `measure_body` for each."""
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
     ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
     radii = bodies.capsule_radius_m.reshape(len(rests), -1)
@@ -69,7 +72,7 @@ def measure_bodies(bodies: Body) -> Anatomy:
 
 
 def measure_body(body: Body) -> Anatomy:
-    """Return the constants of one body; its right side is assumed to be as long as its left."""
+    """Return the constants of one body; both sides are assumed to have the lengths of the left."""
     rest = np.asarray(body.rest_position, float)
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
@@ -89,7 +92,7 @@ def measure_body(body: Body) -> Anatomy:
 
 
 def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
-    """Return `Anatomy.trunk_ends` of a body with rest positions (22, 3)."""
+    """Compute `Anatomy.trunk_ends` of a body from the rest positions (22, 3) of its segments."""
     rows = []
     for name in ROUND:
         k = body.capsule_names.index(name)
@@ -101,7 +104,7 @@ def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
 
 
 def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Return the axes (bone, hinge x bone, hinge) of a bone with a joint that bulges to `pole`."""
+    """Return the axes (bone, hinge x bone, hinge) of a bone with a joint that bends to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)
@@ -109,7 +112,7 @@ def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
 
 
 def _measure_lengths(rest: Floats) -> Floats:
-    """Return `Anatomy.lengths` of rest positions (22, 3)."""
+    """Compute `Anatomy.lengths` from the rest positions (22, 3) of the segments."""
     names = ("clavicle", "arm", "elbow", "wrist", "hip", "knee", "ankle", "ball")
     at = {name: rest[LEFT + index] for index, name in enumerate(names)}
     upper, fore, thigh, shank = (

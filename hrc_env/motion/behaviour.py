@@ -1,7 +1,7 @@
-"""Choice of a worker's next activity from uniform draws in [0, 1) when an activity has ended.
+"""Choice of a worker's next activity at the end of an activity, from random numbers in [0, 1).
 
-The order of jobs at places is defined in `schedule`. A worker without a free path to a place
-chooses another place of the same kind, or waits.
+The order of jobs at workplaces is defined in `schedule`. A worker without a free path to a
+workplace chooses another one of the same kind, or waits.
 """
 
 import math
@@ -30,19 +30,19 @@ from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
 from hrc_env.worker.props import PROP_NAMES
 
 WAIT_S = (0.5, 1.1)
-"""Interval between two searches for a free path [s]; judgement."""
+"""Interval between two searches for a free path [s]. The values are estimates."""
 CHANGE_S = 1.5
-"""Time without a free path after which another errand is chosen [s]; judgement."""
+"""Time without a free path after which another errand is chosen [s]. The value is an estimate."""
 GIVE_UP_S = 4.5
-"""Time without a free path after which the errand is abandoned [s]; judgement."""
+"""Time without a free path after which the errand is abandoned [s]. The value is an estimate."""
 PARKED_M = 60.0
-"""World x and y near which absent workers are parked [m]."""
+"""World x and y of the area in which absent workers are placed [m]."""
 WITH_LOAD = (*st.IDLE, *st.GIVING)
-"""Activities that are possible with a load; the load is set down before any other activity."""
+"""Activities that are possible with a load; before any other activity the load is set down."""
 ABOVE_M = 0.21
-"""Height of working hands above a bench [m]; judgement."""
+"""Height of working hands above a bench [m]. The value is an estimate."""
 CHEST_M = 1.2
-"""Greatest height at which loads are handed over [m]; judgement."""
+"""Maximum height at which loads are handed over [m]. The value is an estimate."""
 
 
 def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> None:
@@ -52,7 +52,7 @@ def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> No
         state: state of all workers, which is changed.
         b: index of the environment.
         w: index of the worker.
-        draws: uniform draws (N_DRAWS,) in [0, 1).
+        draws: uniform random numbers (N_DRAWS,) in [0, 1).
     """
     workers, frames = state.workers[b], state.mind.clips.frames
     worker = workers[w]
@@ -78,15 +78,16 @@ def begin_episode(
     draws: Floats,
     activities: Sequence[int] = (),
 ) -> None:
-    """Begin an episode of an environment: place its workers, in the middle of an activity.
+    """Begin an episode of an environment, with each worker in the middle of an activity.
 
     Args:
         state: state of all workers, which is changed.
         b: index of the environment.
         n_present: number of workers in the episode.
         bodies: row (W,) of each worker's body in the pool.
-        draws: uniform draws (W, 2, N_DRAWS) in [0, 1) for places and first activities.
-        activities: first activities of the first workers, used if there is a place for them.
+        draws: uniform random numbers (W, 2, N_DRAWS) in [0, 1) for the workplaces and
+            first activities.
+        activities: first activities of the first workers, used if workplaces for them are free.
     """
     mind, workers = state.mind_of(b), state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
@@ -122,7 +123,7 @@ def begin_episode(
 
 
 def choose_activity(decision: Decision) -> Action:
-    """Choose and plan the next activity."""
+    """Choose and plan the next activity of a worker."""
     worker = decision.worker
     reaction, left = worker.current_reaction, float(worker.reaction_until_s) - decision.clock_s
     worker.current_reaction = st.NO_REACTION
@@ -152,7 +153,7 @@ def choose_activity(decision: Decision) -> Action:
 
 
 def _store_action(decision: Decision, action: Action) -> None:
-    """Store the planned action, and draw the worker's reaction to the robot during it."""
+    """Store the planned action, and sample the worker's reaction to the robot during the action."""
     people, worker = decision.mind.config.people, decision.worker
     activity = action.activity
     worker.activity, worker.duration_s = activity, action.duration_s
@@ -171,7 +172,7 @@ def _store_action(decision: Decision, action: Action) -> None:
 
 
 def _choose_job(decision: Decision) -> None:
-    """Choose the job that follows the finished one, or another errand."""
+    """Choose a job that follows the completed one, or another errand if there is none."""
     worker, schedule = decision.worker, decision.mind.schedule
     then = schedule.then[worker.job]
     stays = all(schedule.jobs[k].at in (HERE, decision.kind_here) for k, _ in then)
@@ -184,7 +185,7 @@ def _choose_job(decision: Decision) -> None:
 
 
 def _choose_errand(decision: Decision) -> None:
-    """Choose the next errand: at the robot, or elsewhere."""
+    """Choose the next errand, at the robot or elsewhere."""
     mind, worker, draw = decision.mind, decision.worker, decision.draws.item(dc.NEXT)
     near = mind.config.near_probability
     if draw < near or not mind.schedule.begins:
@@ -203,7 +204,7 @@ def _choose_other_place(decision: Decision) -> None:
 
 
 def _begin_job(decision: Decision) -> Action:
-    """Begin the job at the worker's location, or first set down a load that prevents it."""
+    """Begin the job at the worker's location, or first set down a load that prevents the job."""
     activity = st.ACTIVITY_NAMES.index(decision.job.activity)
     if not decision.kind_here:
         activity = st.LOOK_ROUND
@@ -216,7 +217,7 @@ def _begin_job(decision: Decision) -> Action:
 
 
 def _begin_activity(decision: Decision, activity: int) -> Action:
-    """Begin an activity on the spot if no other worker is in the way, else stand for a while."""
+    """Begin an activity on the spot, or stand for a while if another worker is in the way."""
     config, worker = decision.mind.config, decision.worker
     near = decision.kind_here == "robot"
     if activity == st.STAND:
@@ -250,7 +251,7 @@ def _begin_activity(decision: Decision, activity: int) -> Action:
 
 
 def _begin_standing(duration_s: float) -> Action:
-    """Return the action of standing for a duration [s]."""
+    """Return an action in which the worker stands for a duration [s]."""
     return Action(st.STAND, max(duration_s, 0.05))
 
 

@@ -1,4 +1,4 @@
-"""Closed-form motion of every activity, and smooth transitions between activities."""
+"""Evaluation of the closed-form motion of activities, with smooth transitions between them."""
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
@@ -20,14 +20,14 @@ from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import walk, write_footprint
 
 BLEND_S = 0.45
-"""Time in which the difference between two activities decays [s]; about one step."""
+"""Time in which the difference between two activities decays [s], about one step period."""
 RATE_H_S = 1e-4
 """Time step of the finite differences for velocities [s]; the error is 3 mm/s at 60 m/s^2."""
 
 
 @kernel
 def evaluate(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
-    """Write the control vector at time t of the current activity.
+    """Compute the control vector at time t of the current activity.
 
     Args:
         t: time since the activity began [s].
@@ -73,9 +73,10 @@ def evaluate(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def stop(worker: Worker) -> float:
-    """End an activity: stand where it ends, and release a load that was set down or handed over.
+    """End an activity with the worker standing at the final pose, and release a load put down.
 
-    Return the angle by which the heading was unwound, a multiple of a full turn [rad].
+    Returns:
+        The angle added to the heading to wrap it, a multiple of a full turn [rad].
     """
     if worker.activity in st.GIVING or worker.activity == st.PUSH:
         worker.load_prop = 0
@@ -132,7 +133,7 @@ def join(clock_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def place_standing(x: float, y: float, yaw: float, worker: Worker) -> None:
-    """Place a worker standing with the feet side by side, before any activity.
+    """Place a standing worker with the feet side by side, before the first activity.
 
     Args:
         x: world x of the root [m].

@@ -1,4 +1,4 @@
-"""Clips: recorded motion as control vectors, stored in files that any worker can play."""
+"""Clips, which are recorded motion as control vectors, for playback by workers of any size."""
 
 import io
 import zipfile
@@ -15,36 +15,36 @@ from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_
 from hrc_env.motion.curves import pivot_foot
 
 VERSION = 1
-"""Version of the file format; it increases when columns or fields change."""
+"""Version of the file format, which increases with each change of columns or fields."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
-"""Columns (32,) of the control vector that a recording fills: the blended ones and the feet."""
+"""Columns (32,) of the control vector that are recorded: the blended columns and the feet."""
 SLOWEST_HZ = 5.0
-"""Lowest plausible frame rate [Hz]; judgement."""
+"""Lowest plausible frame rate [Hz]. The value is an estimate."""
 FASTEST_HZ = 1000.0
-"""Highest plausible frame rate [Hz]; judgement."""
+"""Highest plausible frame rate [Hz]. The value is an estimate."""
 FARTHEST_M = 200.0
-"""Greatest plausible distance of the root from the origin [m]; judgement."""
+"""Maximum plausible distance of the root from the origin [m]. The value is an estimate."""
 FASTEST_M_S = 15.0
-"""Greatest plausible speed of the root [m/s]; judgement."""
+"""Maximum plausible speed of the root [m/s]. The value is an estimate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Recorded motion of a worker; it begins at the origin, with the worker facing +x."""
+    """Recorded motion that can be played by workers; it begins at the origin, facing +x."""
 
     controls: Floats
-    """Control vectors (T, N_CONTROLS), see `controls`; columns outside of `RECORDED` are zero."""
+    """Control vectors (T, N_CONTROLS); columns outside of `RECORDED` are zero."""
     fps: float
     """Frame rate [Hz]."""
     contacts: Bools
-    """Mask (T, 2) of whether the left and the right foot stand on the floor."""
+    """Mask (T, 2) of the frames in which the left and the right foot stand on the floor."""
     size: Floats
-    """Body dimensions (N_SIZES,) of the worker for this motion [m], see `Anatomy.lengths`."""
+    """Body dimensions (N_SIZES,) to which the motion applies [m], as in `Anatomy.lengths`."""
     source: str
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        """Check shapes, and that values are finite and speeds plausible for a person."""
+        """Check that shapes are correct, values finite, and speeds plausible for a person."""
         q, source = self.controls, self.source
         check_rate(self.fps, source)
         if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
@@ -74,7 +74,7 @@ class Clip:
 
 
 def move_to_origin(controls: Floats) -> Floats:
-    """Return control vectors moved so that the root begins at the origin, facing +x."""
+    """Transform control vectors to begin with the root at the origin, facing +x."""
     out = controls.copy()
     x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -89,7 +89,7 @@ def move_to_origin(controls: Floats) -> Floats:
 def scale_clip(clip: Clip, size: Floats) -> Floats:
     """Return the control vectors (T, N_CONTROLS) for a worker of dimensions (N_SIZES,) [m].
 
-    Paths scale with the length of the legs, the reach of the hands with that of the arms.
+    Paths scale with the length of the legs, and the reach of the hands with that of the arms.
     """
     out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
     out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
@@ -152,10 +152,10 @@ def check_rate(fps: float, source: str) -> None:
 
 
 def find_footprints(feet: Floats, size: Floats) -> Floats:
-    """Return the ankle position and heading (T, 4) that a foot would have if it were flat.
+    """Return the ankle positions and headings (T, 4) of a foot if it were flat [m, rad].
 
     Args:
-        feet: ankle position (3) [m], heading and pitch [rad] of a foot, (T, 5 or more).
+        feet: pose (T, 5 or more) of a foot: ankle position (3) [m], heading and pitch [rad].
         size: dimensions (N_SIZES,) of the body [m].
     """
     flat = feet[:, :3] - shift_by_roll(feet[:, 3], feet[:, 4], size)
@@ -166,8 +166,8 @@ def shift_by_roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
     """Return the displacement (T, 3) of an ankle due to the pitch of its foot [m].
 
     Args:
-        yaw: heading of the foot (T,) [rad].
-        pitch: pitch about the ball if positive, else about the heel (T,) [rad].
+        yaw: heading (T,) of the foot [rad].
+        pitch: pitch (T,) of the foot [rad], about the ball if positive, else about the heel.
         size: dimensions (N_SIZES,) of the body [m].
     """
     ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])

@@ -1,4 +1,4 @@
-"""Settings of the workers' motion, and presets for how they behave near the robot."""
+"""Settings of the workers' motion, and presets of their behaviour near the robot."""
 
 from dataclasses import asdict, dataclass, field, fields
 from typing import NamedTuple
@@ -12,22 +12,22 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.schedule import JOBS, Job, check_jobs
 
 Range = tuple[float, float]
-"""A range (low, high)."""
+"""A range (minimum, maximum)."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
-    """Attention, pace and care of workers; defaults without a source are judgement."""
+    """Attention, pace and caution of workers; defaults without a source are estimates."""
 
     notice_m: float = 0.40
     """Distance from chest, head or a hand within which workers notice the robot's arm [m]."""
     fast_m_s: float = 0.6
     """Approach speed of the arm above which workers notice it within twice `notice_m` [m/s]."""
     delay_s: Range = (0.4, 0.8)
-    """Delay from noticing the arm to reacting [s]; longer than for an expected signal."""
+    """Reaction time after noticing the arm [s], longer than that to an expected signal."""
     pause_probability: float = 0.4
-    """Probability that a worker reacts with a pause: the hands stop, or a walker halts."""
+    """Probability that a worker reacts with a pause, in which the hands or the walker stop."""
     step_back_probability: float = 0.15
     """Probability that a worker reacts by withdrawing the hands and stepping back."""
     pause_s: Range = (0.6, 1.6)
@@ -37,13 +37,13 @@ class PeopleConfig:
     detour_m: float = 0.55
     """Distance that walkers keep from the robot's tool and elbow [m]; 0 to ignore the robot."""
     speed_m_s: Range = (0.8, 1.4)
-    """Walking speed of a worker, drawn once per episode [m/s]; typical of adults indoors."""
+    """Walking speed of a worker, sampled once per episode [m/s], typical of adults indoors."""
     tempo: float = 1.0
-    """Scale of the pauses between tasks and of the stays at a workplace; below 1 is faster."""
+    """Factor applied to the durations of pauses and of stays at a workplace."""
     sudden_probability: float = 0.05
-    """Probability that a reach is sudden; the approach speeds of ISO 13855 assume such reaches."""
+    """Probability that a reach is sudden, as the approach speeds of ISO 13855 assume."""
     lunge_probability: float = 0.01
-    """Probability that a reach to the robot is a lunge: a step and a reach in half a second."""
+    """Probability that a reach to the robot is a lunge (a step and a reach in half a second)."""
     stumble_probability: float = 0.01
     """Probability that a worker stumbles during a walk."""
     fall_probability: float = 0.0
@@ -53,9 +53,9 @@ class PeopleConfig:
     stay_down_probability: float = 0.15
     """Probability that a fallen worker lies on the floor for 15 to 40 s instead of `lie_s`."""
     run_probability: float = 0.0
-    """Probability that a worker with empty hands runs to a place, if the path is long enough."""
+    """Probability that a worker with empty hands runs if the path is sufficiently long."""
     run_m_s: Range = (2.5, 3.5)
-    """Speed of a run [m/s]; a path of 2.4 m allows 2.5 m/s, one of 4.4 m allows 3.5 m/s."""
+    """Speed of a run [m/s]; 2.5 m/s requires a path of 2.4 m, and 3.5 m/s a path of 4.4 m."""
     careless_probability: float = 0.01
     """Probability that a worker steps back without looking between two tasks."""
 
@@ -76,7 +76,7 @@ class PeopleConfig:
 
 
 def _check_ranges(config: "PeopleConfig | MotionConfig") -> None:
-    """Raise `ConfigError` if a range is not (low, high) or a probability is not in [0, 1]."""
+    """Raise `ConfigError` if a range is not ascending or a probability is not in [0, 1]."""
     for name in (item.name for item in fields(config)):
         value = getattr(config, name)
         if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
@@ -122,54 +122,69 @@ PEOPLE: dict[str, PeopleConfig] = {
 }
 """Presets of people by name.
 
-"attentive" workers watch the robot, "hurried" ones react to it less often, and "unaware" ones
-ignore it; "headlong" workers watch the robot, but run and fall.
+"attentive" workers watch the robot, "hurried" workers react to it less often, and "unaware" workers
+ignore it; "headlong" workers watch the robot, but sometimes run and fall.
 """
 
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """Activities of workers and their speeds; values are drawn uniformly from ranges.
-
-    Defaults marked "judgement" have no source.
-    """
+    """Activities of workers and their speeds. Values are sampled uniformly from the ranges."""
 
     near_probability: float = 0.85
-    """Probability that the next errand is at the robot; judgement, for frequent encounters."""
+    """Probability that the next errand is at the robot.
+
+    The value is an estimate, chosen for frequent encounters.
+    """
     near_radius_m: Range = (1.0, 1.35)
-    """Distance of workers at the robot from its base axis [m]; its targets are within reach."""
+    """Distance of workers at the robot from its base axis [m].
+
+    At this distance, the targets in the robot's workspace are within reach of the workers.
+    """
     near_azimuth_rad: float = 0.785
-    """Greatest angle, at the robot's base axis, between its front and workers [rad]; judgement."""
+    """Maximum angle about the base axis between the robot's front and a worker at the robot [rad].
+
+    The value is an estimate.
+    """
     dwell_s: Range = (6.0, 16.0)
-    """Duration of a stay at one workplace before the next errand [s]; judgement."""
+    """Duration of a stay at one workplace before the next errand [s]. The values are estimates."""
     spacing_m: float = 1.1
-    """Least distance between the places of two workers [m]; judgement."""
+    """Minimum distance between the workplaces of two workers [m]. The value is an estimate."""
     near_pause_s: Range = (0.5, 2.0)
-    """Duration of a pause at the robot [s]; judgement."""
+    """Duration of a pause at the robot [s]. The values are estimates."""
     away_pause_s: Range = (1.0, 4.0)
-    """Duration of a pause elsewhere [s]; judgement."""
+    """Duration of a pause elsewhere [s]. The values are estimates."""
 
     target_radius_m: Range = (0.45, 0.9)
-    """Distance of a hand's target from the base axis [m], inside the robot's workspace."""
+    """Distance of a hand's target in the robot's workspace from the base axis [m]."""
     target_z_m: Range = (0.85, 1.4)
     """Height of a hand's target [m], from bench to shoulder."""
     target_spread_rad: float = 0.45
-    """Greatest angle between target and worker about the base axis [rad]; judgement."""
+    """Maximum angle between target and worker about the base axis [rad].
+
+    The value is an estimate.
+    """
     hand_speed_m_s: Range = (0.5, 1.5)
-    """Peak speed of a reaching hand [m/s]; typical of calm manual work."""
+    """Peak speed of a reaching hand [m/s], typical of calm manual work."""
     sudden_speed_m_s: float = 2.5
-    """Peak speed of a sudden reach [m/s]; judgement, near the fastest arm movements at work."""
+    """Peak speed of a sudden reach [m/s].
+
+    The value is an estimate close to the fastest arm movements at work.
+    """
     two_hands_probability: float = 0.3
-    """Probability that a reach uses both hands; judgement."""
+    """Probability that a reach uses both hands. The value is an estimate."""
     hold_s: Range = (0.2, 1.4)
-    """Time for which the hands work at the target [s]; judgement."""
+    """Time for which the hands work at the target [s]. The values are estimates."""
     lift_s: Range = (1.0, 1.4)
-    """Time to bend down to a load, and time to raise it [s]; the wrists reach about 1.3 m/s."""
+    """Time to bend down to a load, and to raise it [s]; the wrists move at up to about 1.3 m/s."""
     load_z_m: Range = (0.15, 0.45)
-    """Height of the grips of a load that stands on the floor or a low box [m]; judgement."""
+    """Height of the grips of a load that stands on the floor or a low box [m].
+
+    The values are estimates.
+    """
 
     people: PeopleConfig = field(default_factory=PeopleConfig)
-    """Attention, pace and care of the workers; settings also accept the name of a preset."""
+    """Attention, pace and caution of the workers; settings also accept the name of a preset."""
     jobs: tuple[Job, ...] = JOBS
     """Jobs of the workers and their order; settings also accept the name of a preset.
 
@@ -182,7 +197,7 @@ class MotionConfig:
     """Probability that a worker with empty hands plays a clip next, if there is room for it."""
 
     def __post_init__(self) -> None:
-        """Check ranges, probabilities, jobs and clips."""
+        """Check the ranges, probabilities, jobs and clips."""
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
@@ -196,14 +211,14 @@ class MotionConfig:
 
 
 class HandParams(NamedTuple):
-    """Settings of reaches and lifts for compiled kernels; ranges are (low, high)."""
+    """Settings of reaches and lifts for compiled kernels; ranges are (minimum, maximum)."""
 
     target_radius_m: Range
     """Distance of a hand's target from the base axis [m]."""
     target_z_m: Range
     """Height of a hand's target [m]."""
     target_spread_rad: float
-    """Greatest angle between target and worker about the base axis [rad]."""
+    """Maximum angle between target and worker about the base axis [rad]."""
     hand_speed_m_s: Range
     """Peak speed of a reaching hand [m/s]."""
     sudden_speed_m_s: float
@@ -240,5 +255,5 @@ def make_hand_params(config: MotionConfig, robot_xy_m: Point) -> HandParams:
 
 
 def _to_floats(limits: Range) -> Range:
-    """Return (low, high) as floats, the types for which kernels are compiled."""
+    """Convert a range to floats, the type for which kernels are compiled."""
     return float(limits[0]), float(limits[1])

@@ -22,7 +22,7 @@ def min_jerk(u: float) -> float:
 
 @kernel
 def ramp(u: float) -> float:
-    """Return the distance travelled at a speed that rises from 0 to 1 over u in [0, 1]."""
+    """Return the distance travelled by u at a speed that rises smoothly from 0 to 1 over [0, 1]."""
     if u <= 0.0:
         return 0.0
     if u >= 1.0:
@@ -32,11 +32,11 @@ def ramp(u: float) -> float:
 
 @kernel
 def cruise(u: float, share: float) -> float:
-    """Return a rise from 0 to 1 over u in [0, 1] at constant speed between smooth ramps.
+    """Return a rise from 0 to 1 over u in [0, 1], with constant speed between smooth ramps.
 
     Args:
-        u: time as a share of the duration.
-        share: share of the duration of the smooth ramp at each end.
+        u: time as a fraction of the duration.
+        share: duration of the smooth ramp at each end, as a fraction of the total duration.
     """
     u, top = min(max(u, 0.0), 1.0), share / (1.0 - share)
     if u < 0.5:
@@ -67,7 +67,7 @@ def soft_min(a: float, b: float, width: float) -> float:
 
 @kernel
 def saturate(d: float, knee: float, limit: float) -> float:
-    """Return `d` up to `knee`, and a value that approaches `limit` smoothly beyond it."""
+    """Return `d` if it is at most `knee`, otherwise a value that approaches `limit` smoothly."""
     if d <= knee:
         return d
     span = limit - knee
@@ -79,7 +79,7 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
     """Return a quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialization).
 
     Args:
-        u: time as a share of the duration.
+        u: time as a fraction of the duration.
         duration: duration [s].
         value: value at the beginning.
         rate: rate at the beginning [1/s].
@@ -119,7 +119,7 @@ def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
     """Displace the point (q[at], q[at + 1]) along and across a heading, in place.
 
     Args:
-        q: array that holds the point [m].
+        q: array that contains the point [m].
         at: index of the point's x.
         yaw: heading [rad].
         ahead: displacement along the heading [m].

@@ -1,4 +1,4 @@
-"""Inputs of the workers' decisions: constants, state, random draws and available places."""
+"""Inputs of the workers' decisions: constants, state, random numbers and free workplaces."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -24,15 +24,20 @@ from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
-"""Index of the draw for each decision; the first `N_START` draws belong to the activity."""
+"""Index of the random number for each decision; the first `N_START` belong to the activity."""
 PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
-"""First draw for places, with three for each of five places; number of draws of a decision."""
+"""Index of the first random number for locations, and number of random numbers of a decision.
+
+Five locations at the robot have three random numbers each.
+"""
 N_STAGES = 4
-"""Number of places with room for a clip that are tried."""
+"""Number of nearest locations with room for a clip that are tried."""
 ANY_ACTIVITY = -1
-"""Value for a first activity that is drawn at random."""
+"""Value for a random first activity."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
+MIN_STAY_S = 0.05
+"""Shortest remaining stay at the first workplace of an episode [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,11 +47,11 @@ class BehaviourParams:
     config: MotionConfig
     """Settings of the workers' motion."""
     hand_params: HandParams
-    """Settings of the hands' motion, as compiled kernels take them."""
+    """Settings of the hands' motion for compiled kernels."""
     plan: Floorplan
     """Floor of the scene."""
     schedule: Schedule
-    """Jobs for which the scene has places."""
+    """Jobs for which the scene has workplaces."""
     clips: Clips
     """Pieces of recorded motion."""
     anatomy: Anatomy
@@ -54,23 +59,23 @@ class BehaviourParams:
     loads: Records1[Load]
     """Loads (L,) at rest in the scene when an episode begins."""
     fewest: int
-    """Least number of workers in an episode."""
+    """Minimum number of workers in an episode."""
     robot_girth_m: float = 0.0
-    """Radius of a mobile robot around the points of it that people watch [m]; 0 for an arm."""
+    """Radius of a mobile robot around its two points that workers watch [m]; 0 for an arm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cast:
-    """Prescribed workers and first activities of one episode; the rest is drawn at random."""
+    """Prescribed workers and first activities of one episode; all other choices are random."""
 
     n_workers: int | None = None
-    """Number of workers; None for a random number."""
+    """Number of workers; None if it is random."""
     bodies: tuple[int, ...] | None = None
-    """Row of the body of each of the first workers; None for random bodies."""
+    """Rows of the first workers' bodies in the pool; None for random bodies."""
     activities: tuple[int, ...] | None = None
     """First activities of the first workers: indices into `ACTIVITY_NAMES` or `ANY_ACTIVITY`."""
     mind: BehaviourParams | None = None
-    """Behaviour in this episode; None for the environment's usual behaviour."""
+    """Constants of behaviour in this episode; None for those of `MotionState.mind`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +83,13 @@ class MotionState:
     """State of all workers; copying its arrays copies the state."""
 
     workers: Records2[Worker]
-    """Record of each worker (B, W)."""
+    """Records (B, W) of the workers."""
     loads: Records2[Load]
     """Loads (B, L) at rest in the scene."""
     mind: BehaviourParams
     """Constants of the behaviour."""
     minds: dict[int, BehaviourParams] = field(default_factory=dict)
-    """Constants for this episode of environments with a custom behaviour, by environment."""
+    """Constants of the environments with a custom behaviour in this episode, by environment."""
 
     def mind_of(self, b: int) -> BehaviourParams:
         """Return the constants of the current episode of environment b."""
@@ -102,7 +107,7 @@ class Decision:
     w: int
     """Index of the deciding worker."""
     draws: Floats
-    """Uniform draws (N_DRAWS,) in [0, 1)."""
+    """Uniform random numbers (N_DRAWS,) in [0, 1)."""
     clock_s: float
     """Time since the episode began [s]."""
     loads: Records1[Load]
@@ -131,7 +136,7 @@ class Decision:
 
     @property
     def job(self) -> Job:
-        """Current or intended job."""
+        """Current or next job."""
         return self.mind.schedule.jobs[self.worker.job]
 
     @property
@@ -140,7 +145,7 @@ class Decision:
         return bool(self.worker.load_prop > 0)
 
     def draw(self, index: int, limits: tuple[float, float]) -> float:
-        """Return a draw scaled to [low, high)."""
+        """Return the random number at `index`, scaled to the range [low, high)."""
         return limits[0] + self.draws.item(index) * (limits[1] - limits[0])
 
     def find_others(self) -> Bools:
@@ -151,9 +156,9 @@ class Decision:
 
 
 def list_obstacles(decision: Decision) -> Floats:
-    """Return discs (n, 3) that a path must avoid: x, y, radius [m].
+    """Return the discs (n, 3) that a path must avoid: x, y, radius [m].
 
-    They cover other workers at the ends of their activities, the robot's arm, and loads.
+    The discs cover the other workers at the ends of their activities, the robot and the loads.
     """
     people, rows = decision.mind.config.people, []
     others = decision.workers[decision.find_others()]
@@ -171,24 +176,29 @@ def list_obstacles(decision: Decision) -> Floats:
 
 
 def list_places(decision: Decision) -> Iterator[Place]:
-    """Yield free places for the job, beginning with the place that was chosen last."""
+    """Yield free workplaces for the job, beginning with the destination of a worker under way."""
     if decision.worker.travel == UNDER_WAY:
         yield Place(*decision.worker.place.tolist())
     yield from _list_free_places(decision, decision.job)
 
 
 def list_stages(decision: Decision, starts: Floats) -> Iterator[Place]:
-    """Yield the `N_STAGES` nearest poses of (k, 3) for a clip, except those near another worker."""
+    """Yield the `N_STAGES` nearest poses for a clip, except those near another worker.
+
+    Args:
+        decision: inputs of the decision.
+        starts: poses (k, 3) with room for the clip: x, y [m], heading [rad].
+    """
     away = np.hypot(*(starts[:, :2] - decision.worker.place[:2]).T)
     nearest = starts[np.argsort(away, kind="stable")[:N_STAGES]].tolist()
     return _keep_free(decision, (Place(x, y, yaw, 0.0) for x, y, yaw in nearest))
 
 
 def _list_free_places(decision: Decision, job: Job) -> Iterator[Place]:
-    """Yield places for a job, except those near another worker.
+    """Yield the workplaces for a job, except those near another worker.
 
-    A job that needs a load is done where such a load rests. A prop is pushed to a place without
-    loads.
+    If a job needs a load, they are those at which such a load rests. A prop is pushed to a
+    workplace without loads.
     """
     if job.prop != PROP_NAMES[0] and job.by == "walk" and job.at != HERE:
         kind = PROP_NAMES.index(job.prop)
@@ -200,7 +210,7 @@ def _list_free_places(decision: Decision, job: Job) -> Iterator[Place]:
 
 
 def _keep_free(decision: Decision, places: Iterable[Place]) -> Iterator[Place]:
-    """Yield places except those near another worker."""
+    """Yield the given workplaces except those near another worker."""
     apart_m = decision.mind.config.spacing_m
     taken = decision.workers["place"][decision.find_others(), :2].tolist()
     for place in places:
@@ -209,7 +219,10 @@ def _keep_free(decision: Decision, places: Iterable[Place]) -> Iterator[Place]:
 
 
 def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
-    """Yield places of a kind: drawn around the robot, given by the scene, or the current one."""
+    """Yield workplaces of a kind.
+
+    Those at the robot are sampled, all others are defined by the scene; "here" is the current one.
+    """
     draws, config, plan = decision.draws[PLACES:].tolist(), decision.mind.config, decision.mind.plan
     if kind == HERE:
         yield Place(*decision.worker.place.tolist())
@@ -230,30 +243,44 @@ def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
 
 
 def take_first_place(decision: Decision) -> None:
-    """Choose a worker's first place and job; if all are taken, choose the most remote location."""
-    mind, worker, draw = decision.mind, decision.worker, decision.draws.item(NEXT)
-    begins = [k for k, _ in mind.schedule.begins]
-    near = draw < mind.config.near_probability or not begins
-    first = mind.schedule.robot if near else begins[int(decision.draws[BOW] * len(begins))]
-    jobs: tuple[int, ...] = (first, mind.schedule.robot, *begins)
+    """Choose the job and the workplace with which a worker begins an episode.
+
+    With probability `MotionConfig.near_probability` it is the job at the robot, otherwise a random
+    job that begins an errand. If its workplaces are taken, the job at the robot and all jobs that
+    begin errands are tried in turn. If a first activity is prescribed, only the jobs of this
+    activity are tried. If no workplace is free, the worker begins without an errand at the location
+    farthest from the other workers.
+
+    Args:
+        decision: inputs of the decision; its worker's `job`, `place_kind`, `place` and, at a
+            workplace, `stay_until_s` are set.
+    """
+    config, schedule, worker = decision.mind.config, decision.mind.schedule, decision.worker
+    robot_job, errand_jobs = schedule.robot, [choice.job for choice in schedule.begins]
+    is_at_robot = decision.draws.item(NEXT) < config.near_probability or not errand_jobs
+    preferred_job = robot_job
+    if not is_at_robot:
+        preferred_job = errand_jobs[int(decision.draws[BOW] * len(errand_jobs))]
+    candidate_jobs: tuple[int, ...] = (preferred_job, robot_job, *errand_jobs)
     if decision.first_activity is not None:
-        jobs = _list_jobs(decision, decision.first_activity, near)
-    for job in jobs:
-        chosen = mind.schedule.jobs[job]
-        for place in _list_free_places(decision, chosen):
-            worker.job, worker.place_kind = job, WORKPLACE_KINDS.index(chosen.at)
+        candidate_jobs = _list_jobs(decision, decision.first_activity, is_at_robot)
+    for k in candidate_jobs:
+        job = schedule.jobs[k]
+        for place in _list_free_places(decision, job):
+            worker.job, worker.place_kind = k, WORKPLACE_KINDS.index(job.at)
             worker.place[:] = place
-            dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-            worker.stay_until_s = max(0.05, dwell * decision.draws.item(LASTS))
+            dwell_s = decision.draw(DWELL, config.dwell_s) * config.people.tempo
+            # The episode begins in the middle of the stay, at a time of 0.
+            worker.stay_until_s = max(MIN_STAY_S, dwell_s * decision.draws.item(LASTS))
             return
-    worker.job, worker.place_kind = mind.schedule.robot, NOWHERE
-    worker.place[:] = _find_loneliest(decision)
+    worker.job, worker.place_kind = robot_job, NOWHERE
+    worker.place[:] = _find_remotest(decision)
 
 
 def group_jobs(schedule: Schedule) -> dict[str, list[int]]:
     """Return the jobs with which an episode can begin on request, by activity.
 
-    These jobs need empty hands and a place, and do not wait for a signal.
+    These jobs begin with empty hands at a workplace, and do not wait for a signal.
     """
     jobs: dict[str, list[int]] = {}
     for k, job in enumerate(schedule.jobs):
@@ -278,8 +305,8 @@ def _list_jobs(decision: Decision, activity: int, near: bool) -> tuple[int, ...]
     return tuple(sorted(turned, key=lambda k: near and schedule.jobs[k].at != "robot"))
 
 
-def _find_loneliest(decision: Decision) -> Place:
-    """Return the walkable location that is farthest from the other workers."""
+def _find_remotest(decision: Decision) -> Place:
+    """Return the walkable location with the greatest distance from the nearest other worker."""
     grid = decision.mind.plan.grid
     x, y = (np.argwhere(grid.slack >= 0.0) * CELL_M + grid.origin).T
     others = decision.workers["place"][decision.find_others(), :2]

@@ -1,7 +1,7 @@
-"""Motion of the feet: fixed to footprints in stance, rolling from heel to ball, then swinging.
+"""Motion of the feet, which roll from heel to ball at each footprint, and swing between them.
 
 Step k is taken by foot (first + k) % 2, which leaves the floor at start + k * period and lands a
-fixed swing time later. Steps that are retraced run backwards in time.
+fixed swing time later. Steps are retraced by reversing their time.
 """
 
 import math
@@ -21,19 +21,19 @@ PUSH_PITCH = 1.0
 FLAT_S = 0.10
 """Time from heel strike to a flat foot [s]."""
 ROLL_SHARE = 0.62
-"""Time from heel-off to toe-off as a share of the period of a step."""
+"""Time from heel-off to toe-off, as a fraction of the period of a step."""
 RAMP_SHARE = 0.29
-"""Share of a swing in which the foot accelerates, and in which it decelerates."""
+"""Fraction of a swing during which the foot accelerates, and equally decelerates."""
 LIFT_BASE_M = 0.025
-"""Rise of the foot in any step, in addition to the rise due to its roll [m]."""
+"""Rise of the foot in each step, in addition to the rise due to its roll [m]."""
 LIFT_STRIDE_M = 0.045
 """Additional rise of the foot in a full stride [m]."""
 RUN_RAMP_SHARE = 0.36
-"""Value of `RAMP_SHARE` for runners; judgement."""
+"""Value that replaces `RAMP_SHARE` in a run. The value is an estimate."""
 KICK_M = 0.20
-"""Additional rise of a runner's heel behind the body [m]; judgement."""
+"""Additional rise of a runner's heel behind the body [m]. The value is an estimate."""
 KICK_PITCH = 1.3
-"""Push-off pitch of a runner as a multiple of a walker's; judgement."""
+"""Ratio of the push-off pitch in a run to that in a walk. The value is an estimate."""
 
 
 class FootPitch(NamedTuple):
@@ -47,14 +47,14 @@ class FootPitch(NamedTuple):
 
 @kernel
 def _pitch_foot(t: float, lift: float, land: float, period: float, stride: float) -> FootPitch:
-    """Return the pitch due to one step: first heel up about the ball, then toes up about the heel.
+    """Compute the pitch due to one step: first heel up about the ball, then toes up about the heel.
 
     Args:
         t: time [s].
         lift: time of lift-off [s].
         land: time of landing [s].
         period: period of a step [s].
-        stride: length of the step as a share of a full stride.
+        stride: length of the step as a fraction of a full stride.
     """
     swing = land - lift
     rising = min(ROLL_SHARE * period, lift)  # the first step's heel stays down until time 0
@@ -70,17 +70,17 @@ def _pitch_foot(t: float, lift: float, land: float, period: float, stride: float
 
 @kernel
 def to_step_time(t: float, worker: Worker) -> float:
-    """Return the time on the steps' clock, which runs backwards while steps are retraced."""
+    """Convert t to the time of the steps, which runs backwards while steps are retraced [s]."""
     undo = worker.undo_at
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
 
 @kernel
 def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: Worker) -> None:
-    """Write the six ankle columns of one foot at time t into the control vector.
+    """Compute the six ankle columns of one foot in the control vector at time t.
 
     Args:
-        t: time on the steps' clock [s].
+        t: time of the steps, from `to_step_time` [s].
         side: 0 left, 1 right.
         footprints: footprints (N, 5) of the steps.
         stance: footprints (2, 5) at the beginning.
@@ -132,7 +132,7 @@ def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: 
 
 @kernel
 def place_feet(t: float, worker: Worker) -> None:
-    """Write the ankle columns of both feet at time t into the control vector."""
+    """Compute the ankle columns of both feet in the control vector at time t."""
     for side in range(2):
         place_foot(t, side, worker.footprints, worker.stance, worker)
 

@@ -1,4 +1,4 @@
-"""Scenes that have room for a clip of recorded motion."""
+"""Selection of the scenes that have room for a clip of recorded motion."""
 
 from collections.abc import Mapping
 
@@ -17,7 +17,7 @@ def measure_played_s(
     worker: str | tuple[str, ...] = "worker_1",
     config: MotionConfig | None = None,
 ) -> dict[str, float]:
-    """Return the duration of a clip that workers can play in each scene [s]; 0 without room.
+    """Return the duration of the part of a clip that fits in each scene [s]; 0 if none fits.
 
     Args:
         clip: recorded motion.
@@ -26,7 +26,8 @@ def measure_played_s(
         config: settings of the workers' motion; None for the default.
 
     Raises:
-        ConfigError: there are no two moments with both feet on the floor, between which to play it.
+        ConfigError: the clip has no two frames with both feet on the floor between which it can be
+            played.
     """
     lengths, played_s = (
         measure_bodies(load_bodies(select_bodies(worker))).lengths,
@@ -42,7 +43,12 @@ def measure_played_s(
 
 
 def describe_fit(clip: Clip, played: dict[str, float]) -> str:
-    """Return a text on the scenes in which a clip plays, given the result of `measure_played_s`."""
+    """Return a text on the scenes in which a clip can be played.
+
+    Args:
+        clip: recorded motion.
+        played: result of `measure_played_s`.
+    """
     whole_s = (len(clip.controls) - 1) / clip.fps
     plays = [f"{name} ({s:.1f} of its {whole_s:.1f} s)" for name, s in played.items() if s > 0.0]
     lacks = [name for name, s in played.items() if s == 0.0]

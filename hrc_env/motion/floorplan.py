@@ -1,4 +1,4 @@
-"""Free space for a worker's root: the distance to obstacles, or slack, on a floor grid."""
+"""Free space for a worker's root, as the distance to obstacles (slack) on a grid."""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from hrc_env.motion.points import Point
 from hrc_env.world import Grounds
 
 BODY_M = 0.40
-"""Distance that walkers keep from objects [m]: half their width with swinging arms."""
+"""Distance that walkers keep from objects [m], half their width with swinging arms."""
 STAND_M = 0.22
-"""Distance that workers keep from objects at work [m]: half a trunk's depth and its sway."""
+"""Distance that workers keep from objects at work [m], half a trunk's depth plus its sway."""
 CELL_M = 0.05
 """Size of a cell of the grid [m]."""
 
@@ -24,29 +24,29 @@ class FloorGrid(NamedTuple):
     """Slack on a grid over the floor; the arrays are read-only."""
 
     slack: Floats
-    """Distance (X, Y) to objects and edges minus `BODY_M` [m]; walkers fit where it is >= 0."""
+    """Distance (X, Y) to objects and edges minus `BODY_M` [m]; there is room where it is >= 0."""
     origin: Floats
     """World x, y (2,) of the first grid point [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floorplan:
-    """The floor of a scene for planning."""
+    """Floor of a scene, with its free space, for the planning of paths."""
 
     grid: FloorGrid
     """Slack on a grid over the floor."""
     grounds: Grounds
-    """Description of the floor by the scene."""
+    """Description of the floor in the scene."""
 
 
 def make_floorplan(grounds: Grounds) -> Floorplan:
     """Compute the free space on the floor of a scene.
 
     Args:
-        grounds: walkable area, footprints of objects, places and the robot.
+        grounds: walkable area, footprints of objects, workplaces and the robot.
 
     Raises:
-        ConfigError: nothing is walkable, or a workplace has no room to stand.
+        ConfigError: no location is walkable, or a workplace has no room to stand.
     """
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
     xs = np.arange(x0, x1 + 0.5 * CELL_M, CELL_M)
@@ -73,7 +73,7 @@ def locate_beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> 
 
 
 def count_room(plan: Floorplan, apart_m: float) -> int:
-    """Return the number of places at least a distance apart, chosen greedily in grid order."""
+    """Return the number of walkable grid points, chosen greedily, that are `apart_m` apart."""
     coarse = 4  # every fourth grid point is tried
     taken = np.zeros((0, 2))
     for point in np.argwhere(plan.grid.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
@@ -83,7 +83,7 @@ def count_room(plan: Floorplan, apart_m: float) -> int:
 
 
 def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
-    """Return the distance (X, Y) from footprints and the robot, minus half a body's width [m].
+    """Return the distance (X, Y) from objects and the robot, minus `BODY_M` [m].
 
     Args:
         xs: world x (X, 1) of the grid points [m].
@@ -103,7 +103,7 @@ def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
 
 @kernel
 def read_slack(x: float, y: float, grid: FloorGrid) -> float:
-    """Interpolate the slack at a point [m]; it is negative outside of the walkable area.
+    """Return the interpolated slack at a point [m], negative outside of the walkable area.
 
     Args:
         x: world x [m].

@@ -1,6 +1,7 @@
 """Batched simulation of the workers: behaviour, activities and kinematics.
 
-Every activity is a closed form of the time since it began; velocities are finite differences.
+The pose in each activity is a closed-form function of the time since its beginning. Velocities are
+computed by finite differences.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,9 +70,9 @@ HALT_S = 0.3
 """Time in which moving hands come to a halt [s]."""
 
 CAST_TRIES = 40
-"""Number of attempts to draw an episode that begins with given activities."""
+"""Number of attempts to sample an episode that begins with the prescribed activities."""
 NOBODY_CAST: Mapping[int, Cast] = MappingProxyType({})
-"""Default without casts: all episodes are drawn at random."""
+"""Empty mapping of casts, with which all episodes are random."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -99,14 +100,14 @@ class BodyPath(NamedTuple):
 
 
 class BodyRates(NamedTuple):
-    """Velocities of bodies in the world frame, and the props that they hold."""
+    """Velocities of bodies in the world frame, and the props held by them."""
 
     velocity: Velocities3
     """Velocities (..., 22, 3) of the origins of the segments [m/s]."""
     angular_velocity: Floats
     """Angular velocities (..., 22, 3) of the segments [rad/s]."""
     held: Floats
-    """Held props (..., N_HELD), see `holding.N_HELD`."""
+    """Held props (..., N_HELD); `holding.N_HELD` describes the columns."""
 
 
 class Advance(NamedTuple):
@@ -115,7 +116,7 @@ class Advance(NamedTuple):
     path: WorkerPath
     """Paths of the bodies, arrays (B, T, W, 22, ...)."""
     motion: WorkerMotion
-    """Bodies after the last step, arrays (B, W, 22, ...)."""
+    """Motion of the bodies after the last step, arrays (B, W, 22, ...)."""
 
 
 class Grip(NamedTuple):
@@ -128,7 +129,7 @@ class Grip(NamedTuple):
 
 
 class MindGroup(NamedTuple):
-    """Environments that share constants of behaviour."""
+    """Environments with the same constants of behaviour."""
 
     mind: BehaviourParams
     """Constants of the behaviour."""
@@ -149,12 +150,13 @@ def make_state(
 
     Args:
         batch: number of environments.
-        n_workers: greatest number of workers in each environment.
-        body: the body of all workers, or a pool from which each worker's body is drawn per episode.
+        n_workers: maximum number of workers in each environment.
+        body: body of all workers, or a pool from which the bodies are sampled in each episode.
         config: settings of the motion.
         grounds: floor of the scene.
-        fewest: least number of workers in an episode, for a random number; None for `n_workers`.
-        robot_girth_m: radius of a mobile robot around the points of it that workers watch [m];
+        fewest: minimum number of workers in an episode, if their number is random; None if it is
+            always `n_workers`.
+        robot_girth_m: radius of a mobile robot around its two points that workers watch [m];
             0 for an arm.
 
     Raises:
@@ -192,12 +194,12 @@ def reset(
     Args:
         state: state of all workers, which is changed.
         ids: environments (N,).
-        rngs: one generator for each of the B environments.
+        rngs: random number generators, one for each of the B environments.
         casts: prescribed parts of episodes, by environment; the random numbers are the same with
             and without a cast.
 
     Raises:
-        ConfigError: there is no place for an activity with which a worker must begin.
+        ConfigError: there is no workplace for a prescribed first activity.
     """
     n_workers, fewest = state.workers.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
@@ -221,16 +223,18 @@ def _begin_cast_episode(
     cast: Cast,
     rng: np.random.Generator,
 ) -> None:
-    """Begin an episode with a cast; draw again until all workers begin with their given activities.
+    """Begin an episode in which workers and first activities are prescribed.
+
+    The episode is sampled again until all workers begin with their prescribed activities.
 
     Args:
         state: state of all workers, which is changed.
         b: index of the environment.
-        n_present: drawn number of workers.
-        bodies: drawn row (W,) of each worker's body in the pool.
-        draws: uniform draws (W, 2, N_DRAWS) in [0, 1).
+        n_present: sampled number of workers.
+        bodies: sampled row (W,) of each worker's body in the pool.
+        draws: uniform random numbers (W, 2, N_DRAWS) in [0, 1).
         cast: prescribed parts of the episode.
-        rng: generator of further draws.
+        rng: random number generator for further samples.
     """
     n = n_present if cast.n_workers is None else cast.n_workers
     if cast.bodies is not None:
@@ -255,7 +259,7 @@ def _begin_cast_episode(
 
 
 def draw_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """Return the body (W,) of each worker from draws in [0, 1), without repetition if possible."""
+    """Select the body (W,) of each worker by random numbers, without repetition if possible."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -270,12 +274,13 @@ def advance(
 
     Args:
         state: state of all workers, which is changed.
-        rngs: one generator for each environment, used only when an activity ends.
+        rngs: random number generators, one for each environment; they are used only when an
+            activity ends.
         dt_s: duration of a step [s].
         n_steps: number of steps T.
 
     Returns:
-        The paths at dt_s, 2 dt_s, ... after the last call, and the bodies at the end.
+        The paths at the times dt_s, 2 dt_s, ..., n_steps dt_s from now, and the bodies at the end.
     """
     workers, frames = state.workers, state.mind.clips.frames
     batch, n_workers = workers.shape
@@ -300,10 +305,11 @@ def watch(
 
     Args:
         state: state of all workers, which is changed.
-        elbow_and_tool_world: elbow and tool, or front and back, of each robot (B, 2, 3) [m].
-        motion: bodies of the workers.
+        elbow_and_tool_world: positions (B, 2, 3) of the elbow and tool of each arm, or of the front
+            and back of each mobile robot [m].
+        motion: motion of the workers' bodies.
         dt_s: time since the last call [s].
-        cue: signal of the task; None if it has none.
+        cue: signal of the task to the workers; None if the task has no signal.
     """
     if cue is not None:
         follow_signal(cue.stage, cue.offered_world, dt_s, state.workers)
@@ -322,7 +328,7 @@ def watch(
 
 
 def _group_by_mind(state: MotionState) -> Iterator[MindGroup]:
-    """Yield each set of constants with the environments that use it."""
+    """Yield each set of behaviour constants with the environments that use it."""
     if not state.minds:
         yield MindGroup(state.mind, (slice(None),))
         return
@@ -337,7 +343,7 @@ def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
 
     Args:
         state: state of all workers.
-        motion: bodies of the workers.
+        motion: motion of the workers' bodies.
     """
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
@@ -366,7 +372,10 @@ def _measure_grip(workers: Records2[Worker], motion: WorkerMotion) -> Grip:
 
 @kernel
 def _count_work(workers: Records2[Worker], n_screws: Ints, boring: Bools) -> None:
-    """Write the number of screws that each worker has driven, and whether one is being driven."""
+    """Count the screws driven by each worker, and determine whether one is being driven.
+
+    The results are written to `n_screws` and `boring`.
+    """
     for b, w in np.ndindex(workers.shape):
         if workers[b, w].activity == st.SCREW:
             progress = count_screws(workers[b, w])
@@ -374,7 +383,7 @@ def _count_work(workers: Records2[Worker], n_screws: Ints, boring: Bools) -> Non
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
-    """Return the current bodies (B, W, 22, ...) of all environments or of environments `ids`."""
+    """Return the current motion (B, W, 22, ...) of the workers of all environments or of `ids`."""
     rows = slice(None) if ids is None else np.asarray(ids, np.int64)
     return evaluate_motion(state.workers[rows], state.mind.clips.frames, state.loads[rows])
 
@@ -382,7 +391,7 @@ def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
 def evaluate_motion(
     workers: Records2[Worker], frames: Floats, loads: Records2[Load] | None = None
 ) -> WorkerMotion:
-    """Return the bodies of workers at the current times of their activities.
+    """Return the motion of the workers' bodies at the current times of their activities.
 
     Args:
         workers: records (B, W).
@@ -405,7 +414,7 @@ def _make_motion(
     rates: BodyRates,
     loads: Records2[Load] | None = None,
 ) -> WorkerMotion:
-    """Return bodies (B, W, ...) with the props that they hold and the loads (B, L) at rest."""
+    """Return the motion of bodies (B, W, ...), with held props and the loads (B, L) at rest."""
     rows = rates.held
     if loads is not None:
         rows = np.concatenate([rows, loads["shown"]], axis=1)
@@ -442,14 +451,14 @@ def _advance_until_decision(
     path: BodyPath,
     rates: BodyRates,
 ) -> bool:
-    """Advance every environment until it is done or a worker has to decide.
+    """Advance each environment until all steps are completed or a worker has to decide.
 
     Args:
         dt_s: duration of a step [s].
         n_steps: number of steps.
         done: number (B,) of completed steps, which is increased.
-        over: mask (B, W) of activities that are over, at their end or reversed to their beginning;
-            these workers must have decided before the next call.
+        over: mask (B, W) of the activities that have ended or have been reversed to their
+            beginning; these workers must decide before the next call.
         workers: records (B, W), which are changed.
         frames: frames of all clips.
         path: path of the bodies, which is written.
@@ -491,7 +500,7 @@ def _advance_until_decision(
 def _evaluate_bodies(
     workers: Records2[Worker], frames: Floats, path: BodyPath, rates: BodyRates
 ) -> None:
-    """Write the current bodies.
+    """Compute the current poses and velocities of all bodies.
 
     Args:
         workers: records (B, W).
@@ -508,7 +517,7 @@ def _evaluate_bodies(
 
 @kernel
 def _tick(dt_s: float, worker: Worker) -> None:
-    """Advance the clocks of a worker by a time step [s], and move the pace towards its target."""
+    """Advance the clocks of a worker by a time step [s], and adjust the pace towards its target."""
     most = dt_s / HALT_S
     worker.pace += min(max(worker.wanted_pace - worker.pace, -most), most)
     worker.time_s += dt_s * worker.pace
@@ -517,7 +526,7 @@ def _tick(dt_s: float, worker: Worker) -> None:
 
 @kernel
 def _pose_at(later_s: float, frames: Floats, worker: Worker) -> None:
-    """Write `q`, `p` and `r` of a worker at a later time.
+    """Compute the pose (`q`, `p` and `r`) of a worker at a later time.
 
     Args:
         later_s: time from now [s].
@@ -530,7 +539,7 @@ def _pose_at(later_s: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: Worker) -> None:
-    """Write the current pose, and velocities from the pose `RATE_H_S` later.
+    """Compute the current pose of a worker, and velocities from the pose `RATE_H_S` later.
 
     Args:
         frames: frames of all clips.
@@ -551,7 +560,7 @@ def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: W
 
 @kernel
 def _write_pose(position: Floats, quaternion: Floats, worker: Worker) -> None:
-    """Write a pose into arrays; absent workers are placed far below the floor.
+    """Copy the pose of a worker to arrays; an absent worker is placed far below the floor.
 
     Args:
         position: origins (22, 3), which are written [m].

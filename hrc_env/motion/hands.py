@@ -1,4 +1,4 @@
-"""Reaching and lifting: hands move to targets, and the trunk leans as far as necessary."""
+"""Reaching and lifting, with the hands at targets and the trunk leaning as far as necessary."""
 
 import math
 from typing import NamedTuple
@@ -24,15 +24,15 @@ from hrc_env.motion.state import Worker
 SPARE_LEAN = 0.04
 """Additional lean beyond the minimum, to compensate for the sway of a standing body."""
 CARRY_FORWARD_M = 0.36
-"""Distance of a lifted load ahead of the root [m]; judgement."""
+"""Distance of a lifted load ahead of the root [m]. The value is an estimate."""
 CARRY_Z_M = 1.05
-"""Height of a lifted load [m]; judgement."""
+"""Height of a lifted load [m]. The value is an estimate."""
 LOAD_HALF_WIDTH_M = 0.20
-"""Half the width of a lifted load [m]; judgement."""
+"""Half the width of a lifted load [m]. The value is an estimate."""
 
 
 class LiftTimes(NamedTuple):
-    """Durations of the phases of a lift."""
+    """Durations of the phases of lifting a load and putting it back."""
 
     bend_s: float
     """Time to bend down, and time to straighten up [s]."""
@@ -44,7 +44,7 @@ class LiftTimes(NamedTuple):
 
 @kernel
 def _turn_head(share: float, worker: Worker) -> None:
-    """Turn the head towards the work by a share of the full turn."""
+    """Turn the head towards the work, by the fraction `share` of the full turn."""
     worker.q[c.HEAD_YAW] += share * (worker.gaze_yaw - worker.q[c.HEAD_YAW])
     worker.q[c.HEAD_PITCH] += share * worker.gaze_pitch
 
@@ -62,7 +62,7 @@ def _extend(out: float, worker: Worker) -> None:
 
 @kernel
 def reach(t: float, worker: Worker) -> None:
-    """Add a reach to the pose of a standing worker: hands out, work at the target, hands back.
+    """Add a reach to the pose of a standing worker: reach out, work at the target, withdraw.
 
     Args:
         t: time since the reach began [s].
@@ -112,7 +112,10 @@ def lift(t: float, worker: Worker) -> None:
 
 @kernel
 def _find_lean(worker: Worker) -> None:
-    """Find the smallest lean that brings the targets within reach, or move the targets nearer."""
+    """Find the smallest lean with the targets within reach.
+
+    Targets out of reach at the maximum lean are moved nearer.
+    """
     p = worker.p
     low, high, worker.lean = 0.0, MOST_LEAN, 0.0
     for attempt in range(12):

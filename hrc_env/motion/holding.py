@@ -1,4 +1,4 @@
-"""Props in the hands: the pose of a prop determines the positions of the hands."""
+"""Holding of props, with the hands positioned by the pose of the prop."""
 
 import math
 
@@ -14,14 +14,14 @@ from hrc_env.worker.props import PROPS
 GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
 """Grips (N, 2, 3) of the left and the right hand on each prop, in the prop's frame [m]."""
 TWO_HANDED = np.array([bool(np.isfinite(prop.grips).all()) for prop in PROPS])
-"""Mask (N,) of props that both hands hold; a tool for one hand is held at its origin."""
+"""Mask (N,) of props held with both hands; a tool for one hand is held at its origin."""
 N_HELD = 8
 """Number of values of a held prop: kind, position (3) [m], unit quaternion (4, scalar first)."""
 
 
 @kernel
 def write_prop_pose(out: Floats, worker: Worker) -> None:
-    """Write the kind, position and quaternion of the held prop into `out` (N_HELD,)."""
+    """Store the kind, position and quaternion of the held prop in `out` (N_HELD,)."""
     out[:] = 0.0
     out[0], out[4] = worker.q[c.PROP], 1.0
     if out[0] == 0.0:
@@ -97,7 +97,7 @@ def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> Non
 
 @kernel
 def grip_load(share: float, worker: Worker) -> None:
-    """Set the targets of the hands that hold the load, with a share of following them."""
+    """Set the targets of the hands that hold the load, with the weight `share` (0 to 1)."""
     for side in range(2):
         held = worker.load_grip[3 * side : 3 * side + 3]
         grip(side, held[0], held[1], held[2], worker)
@@ -106,7 +106,7 @@ def grip_load(share: float, worker: Worker) -> None:
 
 @kernel
 def take_load(prop: int, worker: Worker) -> None:
-    """Plan to hold the prop with both hands at its grips."""
+    """Plan to hold a prop with both hands at its grips."""
     worker.load_prop = prop
     worker.load_at[:] = 0.0
     for i in range(6):

@@ -10,29 +10,32 @@ from hrc_env.motion.curves import min_jerk, saturate, soft_min
 from hrc_env.motion.state import Worker
 
 ARM_KNEE = 0.97
-"""Share of the arm's length beyond which the extension is compressed smoothly."""
+"""Extension of the arm, relative to its length, beyond which it is compressed smoothly."""
 ARM_LIMIT = 0.998
-"""Greatest extension of the arm, as a share of its length."""
+"""Maximum extension of the arm, as a fraction of its length."""
 SHOULDER_RAD = 0.22
-"""Greatest rotation of a clavicle forward and upward [rad]."""
+"""Maximum rotation of a clavicle forward and upward [rad]."""
 LEG_LIMIT = 0.998
-"""Greatest extension of a leg as a share of its length, so that the knees never lock."""
+"""Maximum extension of a leg, as a fraction of its length, which prevents locked knees."""
 LEG_SOFTNESS_M = 0.05
 """Width of the smooth transition from the desired pelvis height to the legs' reach [m]."""
 REST_SOFTNESS_M = 0.06
 """Height above the floor below which a falling trunk is slowed down [m]."""
 TRAILING_SHARE = 0.12
-"""Distance by which a runner's trailing foot may be out of reach, as a share of leg length."""
+"""Distance by which a runner's trailing foot may be out of reach, divided by the leg length."""
 TRAILING_BENT = 0.06
-"""Share of the leg's length from full extension at which a trailing foot begins to follow."""
+"""Distance from full extension at which a trailing foot begins to follow, in leg lengths."""
 HEEL_OFF_M = 0.1
 """Height of a runner's heel at which the foot is trailing [m]."""
 LOWER_KNEE_RAD = 0.5
-"""Roll above which both knees of a lying worker point to the same side [rad]; judgement."""
+"""Roll above which both knees of a lying worker point to the same side [rad].
+
+The value is an estimate.
+"""
 TARGET, POLE, HINGE, GRIP = range(22, 26)
-"""Auxiliary rows of `Worker.p`: a limb's target, pole and hinge of its middle joint, and grip."""
+"""Auxiliary rows of `Worker.p`: a limb's target, its middle joint's pole and hinge, and a grip."""
 TURN = 22
-"""Auxiliary row of `Worker.r`."""
+"""Auxiliary row of `Worker.r` for intermediate rotations."""
 
 
 @kernel
@@ -74,7 +77,7 @@ def multiply(a: int, b: int, out: int, worker: Worker) -> None:
 
 @kernel
 def attach(child: int, parent: int, worker: Worker) -> None:
-    """Set the origin of a child segment from its rest offset in the parent's frame."""
+    """Compute the origin of a child segment from its rest offset in the parent's frame."""
     p, r = worker.p, worker.r
     x, y, z = worker.bones[child, 0], worker.bones[child, 1], worker.bones[child, 2]
     for i in range(3):
@@ -115,12 +118,12 @@ def solve_two_bones(
     The middle joint p[start + 1], the end p[end] and p[HINGE] are written.
 
     Args:
-        start: row of the first bone; its middle joint, row start + 1, bulges towards p[POLE].
+        start: row of the first bone; the middle joint, row start + 1, bends towards p[POLE].
         end: row of `p` for the end of the chain.
         first: length of the first bone [m].
         second: length of the second bone [m].
-        knee: share of the chain's length beyond which the extension is compressed smoothly.
-        limit: greatest extension of the chain, as a share of its length.
+        knee: extension, relative to the chain's length, beyond which it is compressed smoothly.
+        limit: maximum extension of the chain, as a fraction of its length.
         worker: record of the worker; its `p` is written.
     """
     p = worker.p
@@ -149,7 +152,7 @@ def solve_two_bones(
 
 @kernel
 def pose_trunk(worker: Worker) -> None:
-    """Pose pelvis, spine, neck and head at the desired height, as far as the legs reach."""
+    """Pose pelvis, spine, neck and head at the desired height, limited by the reach of the legs."""
     q, p = worker.q, worker.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
     set_rotation(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, worker)
@@ -185,7 +188,7 @@ def pose_trunk(worker: Worker) -> None:
 
 @kernel
 def _rest_on_floor(worker: Worker) -> None:
-    """Raise the trunk and head so that they do not penetrate the floor."""
+    """Raise the trunk and head if they would penetrate the floor."""
     p, r = worker.p, worker.r
     low = math.inf
     for k in range(an.N_ROUND):
@@ -227,7 +230,7 @@ def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worke
 
 @kernel
 def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
-    """Pose a clavicle, which follows the hand slightly, and set p[TARGET] to the grip.
+    """Pose a clavicle, which slightly follows the hand, and set p[TARGET] to the grip.
 
     Args:
         side: 0 left, 1 right.
@@ -303,7 +306,7 @@ def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
 
 @kernel
 def _measure_heel_lift(side: int, worker: Worker) -> float:
-    """Return how far a runner's heel has left the floor, in [0, 1]."""
+    """Return the degree to which a runner's heel has left the floor, from 0 to 1."""
     return min_jerk(
         (worker.q[c.ANKLE + 6 * side + 2] - worker.lengths[an.ANKLE_Z]) / HEEL_OFF_M - 0.5
     )
@@ -376,12 +379,12 @@ def pose(worker: Worker) -> None:
 
 @kernel
 def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
-    """Write the unit quaternion (scalar first, w >= 0) of r[segment] by Shepperd's method.
+    """Compute the unit quaternion (scalar first, w >= 0) of r[segment] by Shepperd's method.
 
     Args:
         r: rotations (N, 3, 3).
         segment: row of `r` and of `out`.
-        out: quaternions (N, 4).
+        out: quaternions (N, 4), of which one row is written.
     """
     trace = r[segment, 0, 0] + r[segment, 1, 1] + r[segment, 2, 2]
     if trace > 0.0:
@@ -412,14 +415,14 @@ def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
 def write_angular_velocity(
     before: Floats, after: Floats, segment: int, duration: float, out: Floats
 ) -> None:
-    """Write the angular velocity between a rotation and a slightly later one, in the world frame.
+    """Compute the angular velocity in the world frame from two successive rotations.
 
     Args:
         before: rotations (N, 3, 3).
         after: rotations (N, 3, 3) a short time later.
         segment: row of `before`, `after` and `out`.
-        duration: time between both [s].
-        out: angular velocities (N, 3) [rad/s].
+        duration: time between `before` and `after` [s].
+        out: angular velocities (N, 3), of which one row is written [rad/s].
     """
     x = y = z = 0.0
     for a in range(3):

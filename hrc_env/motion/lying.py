@@ -1,7 +1,7 @@
-"""Loads at rest in the scene: initially in piles, later where workers lay them down.
+"""Loads at rest in the scene, initially in piles and later where workers have laid them down.
 
-No load appears or vanishes. A worker picks up the uppermost load at a place; a load that is laid
-down stays there, on top of the loads below it. Only a reset restores the piles.
+The number of loads is constant. A worker picks up the uppermost load at a workplace; a load that is
+laid down remains there, on top of the loads below it, until a reset restores the piles.
 """
 
 import math
@@ -34,9 +34,9 @@ class Load:
     pose: Annotated[Floats, (6,)]
     """Pose in the world: x, y, z [m], yaw, pitch, roll [rad]."""
     stand: Annotated[Floats, (4,)]
-    """Place from which the load is picked up: x, y [m], heading [rad], height [m]."""
+    """Pose of a worker that picks up the load: x, y [m], heading [rad], height of the work [m]."""
     at: int
-    """Kind of the place `stand`, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
+    """Kind of the workplace at `stand`, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
 
 
 @with_fields(Load)
@@ -47,28 +47,28 @@ class LoadRow(np.void):
 LOAD = np.dtype((LoadRow, dtype_of(Load)))
 """NumPy data type of a `Load`; the fields of its rows are attributes in Python, too."""
 MOVED_M = 0.015
-"""Greatest random displacement of a load in a pile along x and y [m]."""
+"""Maximum random displacement of a load in a pile along x and y [m]."""
 TURNED_RAD = 0.03
-"""Greatest random rotation of a load in a pile [rad]."""
+"""Maximum random rotation of a load in a pile [rad]."""
 HIGH = ("pile", "bench", "task")
-"""Kinds of places with a surface for loads at the place's height.
+"""Kinds of workplaces with a surface for loads at the workplace's height.
 
-At other places, loads rest on the floor or hang on the wall.
+At other workplaces, loads rest on the floor or hang on the wall.
 """
 HUNG_M = 1.2
-"""Greatest height of boards that hang on a wall [m]; judgement."""
+"""Maximum height of boards that hang on a wall [m]. The value is an estimate."""
 AT_HAND_M = 0.13
-"""Distance from the place of a load within which a worker can pick it up [m]."""
+"""Distance from `Load.stand` within which a worker can pick up the load [m]."""
 EXACT_M = 0.01
-"""Distance from the place of a cart within which a worker can grasp it [m]."""
+"""Distance from the `Load.stand` of a cart within which a worker can grasp it [m]."""
 EXACT_COS = 0.9999
-"""Least cosine of the heading error at the place of a cart for which a worker can grasp it."""
+"""Minimum cosine of the heading error with which a worker can grasp a cart."""
 WHEELED = (CART, WHEELBARROW)
-"""Props that are held by their handles."""
+"""Wheeled props, which are pushed by their handles."""
 ROOM_M = 0.40
-"""Distance of paths from a load's centre, in addition to half its shorter side [m]."""
+"""Minimum distance of paths from a load's centre, in addition to half its shorter side [m]."""
 TOUCH_M = 0.01
-"""Overlap up to which two loads count as lying beside each other [m]."""
+"""Maximum overlap of two loads that are considered to lie beside each other [m]."""
 
 
 class Extent(NamedTuple):
@@ -81,7 +81,7 @@ class Extent(NamedTuple):
 
 
 class Footprints(NamedTuple):
-    """Rectangles that loads cover on the floor."""
+    """Rectangles on the floor that are covered by loads."""
 
     middle: Floats
     """Centres (n, 2) in the world [m]."""
@@ -115,7 +115,7 @@ def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Loa
 
 
 def get_place(place: Workplace) -> Place:
-    """Return the pose at which a worker stands at a workplace."""
+    """Return the pose of a worker at a workplace, with the height of the work."""
     return Place(*place.xy_m, place.yaw_rad, place.height_m)
 
 
@@ -125,7 +125,7 @@ def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Gen
     Args:
         loads: rows of the environment, which are written.
         first: initial loads, from `make_loads`.
-        rng: generator of the displacements.
+        rng: random number generator of the displacements.
     """
     loads[...] = np.zeros((), LOAD)
     loads[: len(first)] = first
@@ -141,14 +141,14 @@ def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Gen
 def find_rest_pose(
     kind: int, at: str, stand: Place, ahead_m: float, loads: Records1[Load]
 ) -> Floats:
-    """Return the rest pose (6,) of a load that is laid down at a place.
+    """Return the rest pose (6,) of a load that is laid down at a workplace.
 
     A board at a wall hangs flat on it, below other boards there; any other load rests on top of the
     loads below it.
 
     Args:
         kind: kind of the load, an index into `PROPS`.
-        at: kind of the place; "" for none.
+        at: kind of the workplace; "" for none.
         stand: pose at which the worker stands.
         ahead_m: distance of the load ahead of the worker [m].
         loads: loads at rest in the scene.
@@ -178,7 +178,13 @@ def find_uncovered(loads: Records1[Load]) -> Bools:
 
 
 def list_stands(loads: Records1[Load], kind: int, at: str) -> Iterator[Place]:
-    """Yield the places of a kind from which loads of a kind can be picked up."""
+    """Yield the poses of a worker that picks up a load of one kind, at workplaces of one kind.
+
+    Args:
+        loads: loads at rest in the scene.
+        kind: kind of the loads, an index into `PROPS`.
+        at: kind of the workplaces.
+    """
     here = find_uncovered(loads) & (loads["shown"][:, 0] == kind)
     here &= loads["at"] == WORKPLACE_KINDS.index(at)
     for row in loads["stand"][here]:
@@ -186,7 +192,7 @@ def list_stands(loads: Records1[Load], kind: int, at: str) -> Iterator[Place]:
 
 
 def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
-    """Return the row of a load of a kind that a worker can pick up on the spot; -1 for none."""
+    """Return the row of a load of a kind within a worker's reach on the spot; -1 for none."""
     x, y, yaw = loads["stand"][:, :3].T
     away = np.hypot(x - worker.start_x, y - worker.start_y)
     near = find_uncovered(loads) & (loads["shown"][:, 0] == kind) & (away < AT_HAND_M)
@@ -196,7 +202,7 @@ def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
 
 
 def has_load_at(loads: Records1[Load], stand: Place) -> bool:
-    """Return whether any load is picked up from near the place `stand`."""
+    """Return whether a worker at the pose `stand` or near it can pick up any load."""
     away = np.hypot(*(loads["stand"][:, :2] - stand[:2]).T)
     return bool(((loads["shown"][:, 0] > 0) & (away < AT_HAND_M)).any())
 
@@ -223,7 +229,7 @@ def find_place_here(places: Sequence[Workplace], worker: Worker) -> Workplace | 
 def find_rest_pose_here(
     loads: Records1[Load], places: Sequence[Workplace], worker: Worker
 ) -> Floats:
-    """Return the rest pose (6,) of a worker's load if it is laid down on the spot."""
+    """Return the rest pose (6,) of a worker's load after it is laid down on the spot."""
     kind, place = int(worker.load_prop), find_place_here(places, worker)
     if place is None:
         here = Place(float(worker.start_x), float(worker.start_y), float(worker.start_yaw), 0.0)
@@ -232,7 +238,7 @@ def find_rest_pose_here(
 
 
 def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Worker) -> None:
-    """Add the load that a worker has laid down in an activity to the loads at rest."""
+    """Add the load that a worker has just laid down to the loads at rest."""
     free = np.flatnonzero(loads["shown"][:, 0] == 0)
     if not len(free):
         return
@@ -246,20 +252,25 @@ def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Wo
 
 
 def list_load_discs(loads: Records1[Load]) -> Floats:
-    """Return discs (n, 3) around loads that paths must avoid: x, y, radius [m]."""
+    """Return the discs (n, 3) around loads that paths must avoid: x, y, radius [m]."""
     lying = loads[loads["shown"][:, 0] > 0]
     middle, half = _project(lying["shown"][:, 0], lying["pose"])
     return np.concatenate([middle, ROOM_M + half.min(1, keepdims=True)], axis=1)
 
 
 def _measure_extent(kind: int, is_hung: bool) -> Extent:
-    """Return the vertical extent of a load of a kind, hanging on a wall or lying."""
+    """Return the vertical extent of a load that hangs on a wall or lies.
+
+    Args:
+        kind: kind of the load, an index into `PROPS`.
+        is_hung: whether the load hangs on a wall.
+    """
     axis = 0 if is_hung else 2
     return Extent(float(BOUNDS_M[kind, 0, axis]), float(BOUNDS_M[kind, 1, axis]))
 
 
 def _find_overlapping(kind: int, pose: Floats, loads: Records1[Load]) -> Bools:
-    """Return a mask (L,) of the loads above or below a load of a kind at a pose (6,)."""
+    """Return a mask (L,) of the loads that overlap, on the floor, a load at a pose (6,)."""
     middle, half = _project(np.array([kind]), pose[None])
     middles, halves = _project(loads["shown"][:, 0], loads["pose"])
     off, yaws = middles - middle, loads["pose"][:, 3]
@@ -272,7 +283,7 @@ def _find_overlapping(kind: int, pose: Floats, loads: Records1[Load]) -> Bools:
 
 
 def _project(kind: Floats, poses: Floats) -> Footprints:
-    """Return the rectangles that loads of kinds (n,) at poses (n, 6) cover on the floor."""
+    """Return the rectangles on the floor covered by loads of kinds (n,) at poses (n, 6)."""
     box = BOUNDS_M[kind.astype(int), :, :2]
     (ahead, left), half = box.mean(1).T, 0.5 * (box[:, 1] - box[:, 0])
     cos, sin = np.cos(poses[:, 3]), np.sin(poses[:, 3])

@@ -1,8 +1,8 @@
-"""Paths over the floor: straight lines joined by arcs, parameterized by arc length.
+"""Paths on the floor of straight lines joined by arcs, parameterized by arc length.
 
-The columns of a piece (a row of `Worker.path`) are the arc length at its beginning [m]; x, y [m]
-and the direction [rad] (not wrapped) there; its curvature [1/m]; and the integral of the direction
-over the arc length up to there [rad m].
+Each line or arc is a row of `Worker.path`. The columns are the arc length at its beginning [m]; x,
+y [m] and the direction [rad] (not wrapped) at this point; the curvature [1/m]; and the integral of
+the direction over the arc length up to this point [rad m].
 """
 
 import math
@@ -14,16 +14,16 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import MAX_VIA, Worker
 
 HEADING_WINDOW_M = 0.3
-"""Half width of the window over which the direction is averaged (Grasso et al. 1998) [m]."""
+"""Half the width of the window over which the direction is averaged [m] (Grasso et al. 1998)."""
 OWN_EDGE = 0.9
-"""Greatest share of the first or last edge that the arc of a corner occupies."""
+"""Maximum fraction of the first or last edge of a path that the arc of a corner occupies."""
 SHARED_EDGE = 0.5
-"""Greatest share of an edge between two corners that the arc of either corner occupies."""
+"""Maximum fraction of an edge between two corners that the arc of each corner occupies."""
 
 
 @kernel
 def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
-    """Write the path through some corners, its length and its greatest curvature.
+    """Compute a path with given corners, its length and its maximum curvature.
 
     Args:
         start: first point of the path.
@@ -66,7 +66,7 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
 
 @kernel
 def _find_piece(distance: float, worker: Worker) -> int:
-    """Return the index of the piece at a distance [m] along the path."""
+    """Return the index of the line or arc at a distance [m] along the path."""
     k = worker.n_pieces - 1
     while k > 0 and worker.path[k, 0] > distance:
         k -= 1

@@ -1,4 +1,4 @@
-"""Points, poses and places on the floor, and pairs of related numbers.
+"""Points and poses on the floor, and pairs of related numbers.
 
 Kernels take and return these named tuples; points in space are `hrc_env.core.typing.Vector3`.
 """

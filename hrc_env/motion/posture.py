@@ -12,38 +12,50 @@ from hrc_env.motion.points import Point, Sides
 from hrc_env.motion.state import Worker
 
 STANCE_HALF_WIDTH_M = 0.10
-"""Half the distance between the ankles in standing [m]; shoulder width of the baked bodies."""
+"""Half the distance between the ankles in standing [m], with the feet below the shoulders."""
 TOE_OUT_RAD = 0.12
-"""Outward turn of the feet in standing and walking [rad]; about 7 degrees."""
+"""Outward turn of the feet in standing and walking [rad], about 7 degrees."""
 SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
-"""Incommensurable frequencies of a standing person's sway [Hz]; judgement."""
+"""Frequencies of a standing person's sway [Hz], estimates without a common period."""
 SHIFT_M = 0.018
-"""Amplitude of the lateral weight shift [m]; judgement."""
+"""Amplitude of the lateral weight shift [m]. The value is an estimate."""
 RELAXED_PITCH = 0.02
-"""Forward rotation of a hanging upper arm [rad]; judgement."""
+"""Forward rotation of a hanging upper arm [rad]. The value is an estimate."""
 RELAXED_ELBOW = 0.38
-"""Bend of the elbow of a hanging arm [rad]; judgement."""
+"""Bend of the elbow of a hanging arm [rad]. The value is an estimate."""
 RELAXED_OUT = 0.26
-"""Abduction of a hanging upper arm from the trunk [rad]; judgement."""
+"""Abduction of a hanging upper arm from the trunk [rad]. The value is an estimate."""
 HAND_OUT_M = 0.05
-"""Lateral distance of a hanging hand from its elbow [m], to clear broad hips; judgement."""
+"""Lateral distance of a hanging hand from its elbow [m], with which it clears broad hips.
+
+The value is an estimate.
+"""
 MOST_LEAN = 1.3
-"""Greatest lean; a person would take a step instead of leaning further."""
+"""Maximum lean, as defined in `lean`; a person would take a step instead of leaning further."""
 NECK_SHARE = 0.70
-"""Height of the eyes above the pelvis as a share of pelvis height, from the baked bodies."""
+"""Height of the eyes above the pelvis, divided by the pelvis height, in the worker models."""
 HEAD_SHARE = 0.75
-"""Share of the head in a gaze shift besides the eyes (Freedman & Sparks 1997: 70-80 %)."""
+"""Fraction of a gaze shift that the head contributes (Freedman & Sparks 1997: 70-80 %)."""
 MOST_YAW_RAD = 1.2
-"""Greatest yaw of the head relative to the chest [rad]; comfortable range, judgement."""
+"""Maximum yaw of the head relative to the chest [rad].
+
+The value is an estimate of the comfortable range.
+"""
 MOST_DOWN_RAD = 0.75
-"""Greatest downward pitch of the head from the chest [rad]; comfortable range, judgement."""
+"""Maximum downward pitch of the head relative to the chest [rad].
+
+The value is an estimate of the comfortable range.
+"""
 MOST_UP_RAD = 0.75
-"""Greatest upward pitch of the head from the chest [rad]; comfortable range, judgement."""
+"""Maximum upward pitch of the head relative to the chest [rad].
+
+The value is an estimate of the comfortable range.
+"""
 
 
 @kernel
 def sway(clock_s: float, i: int, worker: Worker) -> float:
-    """Return a slow wave in [-1, 1] with a phase of the worker.
+    """Return a slow sine wave in [-1, 1] with a phase of the worker.
 
     Args:
         clock_s: time since the episode began [s].
@@ -77,7 +89,7 @@ def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
 
 @kernel
 def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> None:
-    """Write all columns except those of the feet for relaxed standing with sway and gaze shifts.
+    """Compute the control vector of relaxed standing with sway and gaze shifts, except the feet.
 
     Args:
         x: world x of the root [m].
@@ -117,8 +129,8 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
     """Bend the trunk forward while the pelvis moves back, and twist it.
 
     Args:
-        amount: lean; 1 is a deep bow.
-        squat: share of the lean that is achieved by bending the knees.
+        amount: lean, from 0 (upright) to 1 (a deep bow) and beyond.
+        squat: fraction of the lean that is achieved by bending the knees.
         twist: twist of the trunk to the left [rad].
         worker: record of the worker; its `q` is changed.
     """
@@ -134,7 +146,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
 
 @kernel
 def measure_overreach(worker: Worker) -> float:
-    """Return the distance by which the hands' targets are beyond the reach of the arms [m]."""
+    """Return the greatest distance of a hand's target beyond the reach of the arm [m]."""
     used = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1])
     far = find_farthest(UPPER_ARM, worker.q[c.HAND_TARGET :], used, worker)
     return max(far - ARM_KNEE * worker.lengths[ARM], -1.0)
@@ -147,7 +159,7 @@ def find_farthest(segment: int, goals: Floats, used: Sides, worker: Worker) -> f
     Args:
         segment: segment of an arm, counted from the first of its side.
         goals: points in the world (6,), left and right [m].
-        used: 1 for each arm that counts, else 0; -1 is returned if neither does.
+        used: 1 for each arm that is considered, else 0; -1 is returned if neither is.
         worker: record with the control vector.
     """
     pose(worker)
@@ -196,7 +208,7 @@ def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
         x: world x of the point [m].
         y: world y of the point [m].
         z: world z of the point [m].
-        share: share of the full turn.
+        share: fraction of the full turn.
         worker: record of the worker; its `q` is changed.
     """
     q = worker.q

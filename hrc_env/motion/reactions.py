@@ -1,7 +1,7 @@
-"""Workers' reactions to the robot: they pause, or withdraw their hands and step back.
+"""Reactions of workers to the robot by pausing, or by withdrawing the hands and stepping back.
 
-Hands pause or withdraw as the clock of their activity halts or runs backwards; walkers brake.
-The kind and delay of a reaction are drawn when an activity begins.
+Hands pause or withdraw because the clock of their activity halts or runs backwards. Walkers brake.
+The kind and delay of a reaction are sampled when an activity begins.
 """
 
 import math
@@ -19,19 +19,34 @@ from hrc_env.motion.traffic import find_meeting, is_on_path
 from hrc_env.motion.walk import brake
 
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
-"""Segments near which workers notice the robot."""
+"""Segments of a worker near which the robot is noticed."""
 MEETS_M = 0.20
-"""Greatest distance by which a hand adapts to the position of an offered tool [m]; judgement."""
+"""Maximum distance by which a hand adapts to the position of an offered tool [m].
+
+The value is an estimate.
+"""
 MEETS_M_S = 0.30
-"""Speed at which a hand adapts to the position of an offered tool [m/s]; judgement."""
+"""Speed at which a hand adapts to the position of an offered tool [m/s].
+
+The value is an estimate.
+"""
 WAITS_SHARE = 0.4
-"""Share of bending down after which a worker no longer waits for the robot; judgement."""
+"""Completed fraction of bending down beyond which a worker no longer waits for the robot.
+
+The value is an estimate.
+"""
 WITHDRAW = -1.6
-"""Pace of the activity's clock while hands are withdrawn."""
+"""Rate of the activity's clock while the hands are withdrawn; negative for reversed motion."""
 MACHINE_S = 2.0
-"""Time horizon over which walkers predict the motion of a mobile robot [s]; judgement."""
+"""Time horizon over which walkers predict the motion of a mobile robot [s].
+
+The value is an estimate.
+"""
 MACHINE_CALM_S = 0.4
-"""Time after a reaction to a mobile robot without another reaction [s]; judgement."""
+"""Time after a reaction to a mobile robot before the next reaction is possible [s].
+
+The value is an estimate.
+"""
 
 
 class NoticeParams(NamedTuple):
@@ -44,7 +59,7 @@ class NoticeParams(NamedTuple):
     calm_s: float
     """Time after a reaction during which a worker does not react again [s]."""
     base_radius_m: float
-    """Radius of a mobile robot around the points that are watched [m]; 0 for an arm."""
+    """Radius of a mobile robot around its two points that workers watch [m]; 0 for an arm."""
 
 
 @kernel
@@ -56,7 +71,7 @@ def notice_robot(
     velocity_world: Floats,
     workers: Records2[Worker],
 ) -> None:
-    """Update which workers notice the robot, and begin reactions that are due.
+    """Determine which workers notice the robot, and begin the reactions with an elapsed delay.
 
     Args:
         dt_s: time since the last call [s].
@@ -124,7 +139,7 @@ def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[W
 
 @kernel
 def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
-    """Move the target of a hand that takes a tool towards the offered point, if that is close.
+    """Move the target of a hand that takes a tool towards the offered point, if this is close.
 
     Args:
         offered: point (3,) at which the tool is offered [m].
@@ -168,7 +183,7 @@ def _is_load_in_use(params: NoticeParams, robot: Floats, worker: Worker) -> bool
 def _is_arm_startling(
     dt_s: float, params: NoticeParams, robot: Floats, body: Floats, worker: Worker
 ) -> bool:
-    """Return whether a point of the arm is close to the worker, or approaches fast.
+    """Return whether the arm is so close to a worker, or approaches so fast, that it is noticed.
 
     Args:
         dt_s: time since the last call [s].
@@ -203,9 +218,9 @@ def _is_machine_startling(
     chest_velocity: Floats,
     worker: Worker,
 ) -> bool:
-    """Return whether a mobile robot is too close, or soon will be too close to a walker.
+    """Return whether a mobile robot is, or soon will be, too close to a walker.
 
-    Distances are horizontal. Walkers that notice robots at all never overlook a mobile robot.
+    Distances are horizontal. A walker that reacts to robots always notices a mobile robot.
 
     Args:
         dt_s: time since the last call [s].
@@ -261,7 +276,7 @@ def _react(w: int, workers: Records1[Worker]) -> None:
 
 @kernel(makes_arrays=True)
 def _brake(w: int, workers: Records1[Worker]) -> bool:
-    """Brake a walker unless another one would come too close; return whether the walker brakes."""
+    """Brake a walker unless another worker would come too close; return whether it brakes."""
     before = np.empty(1, WORKER)
     before[0] = workers[w]
     duration_s = brake(workers[w].time_s, workers[w])

@@ -1,4 +1,4 @@
-"""All activities of workers as scenes of one or a few activities, for reports and pictures."""
+"""Sequences of one or a few activities that cover all activities, for reports and pictures."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -27,11 +27,11 @@ from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
 AWAY_M = 3.0
-"""Default length of a path [m]."""
+"""Default length of a straight path [m]."""
 FAR_M = 8.0
 """Length of the walks and runs that are evaluated [m]."""
 OPEN = FloorGrid(np.full((401, 401), 9.0), np.full(2, -10.0))
-"""An empty floor, 10 m to each side."""
+"""Empty floor of 20 m x 20 m around the origin."""
 
 
 class Act(NamedTuple):
@@ -47,7 +47,7 @@ class Act(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """Recorded performance of one activity."""
+    """Sampled motion of one activity."""
 
     activity: int
     """Index into `ACTIVITY_NAMES`."""
@@ -56,9 +56,9 @@ class Film:
     controls: Floats
     """Control vectors (T, N_CONTROLS)."""
     motion: WorkerMotion
-    """Bodies, arrays (T, 1, ...)."""
+    """Motion of the body, arrays (T, 1, ...)."""
     worker: Worker
-    """Record of the worker with the plan of the activity."""
+    """Record of the worker, which contains the plan of the activity."""
 
 
 def make_worker(
@@ -68,7 +68,7 @@ def make_worker(
 
     Args:
         body: body of the worker.
-        xy_m: root on the floor, in the world [m].
+        xy_m: position of the root on the floor, in the world [m].
         yaw_rad: heading [rad].
         right: whether the worker is right-handed.
     """
@@ -85,13 +85,13 @@ def make_worker(
 def perform(
     acts: Sequence[Act], worker: Worker, rng: np.random.Generator, dt_s: float
 ) -> list[Film]:
-    """Perform activities in sequence and return a film of each; the worker ends at the last pose.
+    """Perform activities in sequence and return the sampled motion of each.
 
     Args:
-        acts: activities in their order.
-        worker: record of the worker, which is changed.
-        rng: generator of the draws.
-        dt_s: sampling interval of the films [s].
+        acts: activities, in the order in which they are performed.
+        worker: record of the worker, which is changed; it ends in the last pose.
+        rng: random number generator of the plans.
+        dt_s: sampling interval of the motion [s].
     """
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
@@ -105,10 +105,10 @@ def perform(
 
 
 def _record(worker: Worker, time_s: Floats, clock_s: float) -> Film:
-    """Return the film of an activity, with angular velocities of zero.
+    """Return the sampled motion of an activity, with angular velocities of zero.
 
     Args:
-        worker: record with the plan.
+        worker: record of the worker, which contains the plan.
         time_s: times (T,) since the activity began [s].
         clock_s: episode time at which the activity began [s].
     """
@@ -130,7 +130,7 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
     """
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
-        """Lay the path and plan to go along it."""
+        """Plan the path, and the motion along it."""
         x, y, yaw = float(worker.start_x), float(worker.start_y), float(worker.start_yaw)
         lay_path(Point(x, y), np.zeros((0, 3)), move_point(x, y, yaw, way_m, 0.0), worker)
         if activity == st.RUN:
@@ -144,7 +144,7 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
 
 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
-    """Return the activity of hammering with light taps or with blows."""
+    """Return a scene of hammering with light taps or with blows."""
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
         """Plan to hammer with light taps or with blows."""
@@ -162,7 +162,13 @@ def _turn(draws: Floats, height_m: float, worker: Worker) -> float:
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
-    """Return the activity of picking up a load."""
+    """Return an activity of picking up a load.
+
+    Args:
+        prop: load, an index into `PROPS`.
+        on_shoulder: whether the load is carried on the shoulder.
+        height_m: height of the grips [m].
+    """
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
         """Plan to pick up the load."""
@@ -172,7 +178,7 @@ def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
 
 
 def _here(activity: int, height_m: float = 0.0) -> tuple[Act, ...]:
-    """Return an activity on the spot."""
+    """Return a scene of one activity on the spot."""
     return (Act(activity, STARTS[activity], height_m),)
 
 
@@ -224,6 +230,6 @@ FOR_TASKS: dict[str, tuple[Act, ...]] = {
     "screw below each other": _here(st.SCREW, 1.5),
     "take what is brought": _here(st.TAKE, 1.15),
 }
-"""Scenes of the activities in tasks, by name."""
+"""Scenes of activities that occur only in tasks, by name."""
 SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
-"""All scenes by name."""
+"""All scenes, by name."""

@@ -1,4 +1,4 @@
-"""Paths around objects and people: A* on a grid (Hart et al. 1968) with shortcuts."""
+"""Search for paths around objects and people by A* on a grid (Hart et al. 1968) with shortcuts."""
 
 import heapq
 import math
@@ -14,25 +14,25 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import MAX_VIA, Worker
 
 STRIDE = 3
-"""Distance between nodes of the search, in cells of the floor's grid; 15 cm."""
+"""Distance between nodes of the search, in cells of the floor's grid (15 cm)."""
 SAMPLE_M = 0.06
-"""Distance between the points of a line that are checked [m]."""
+"""Distance between the points at which a line is checked [m]."""
 EASE_M = 0.7
-"""Distance from an end of a path within which less slack than required is accepted [m]."""
+"""Distance from the ends of a path within which less slack than elsewhere is accepted [m]."""
 SEARCHED_M = 0.05
-"""Least slack of nodes of the search [m]."""
+"""Minimum slack at the nodes of the search [m]."""
 PULLED_M = 0.03
-"""Least slack of straight lines [m]."""
+"""Minimum slack along straight lines [m]."""
 WALKED_M = -0.02
-"""Least slack of the path with its arcs [m]."""
+"""Minimum slack along the path with its arcs [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
 """Distances before a corner at which its arc may begin, tried in turn [m]."""
 BOW_SHARE = 0.12
-"""Lateral bow of a free path as a share of its length, because people do not walk straight."""
+"""Maximum lateral bow of an unobstructed path, as a fraction of its length."""
 
 
 class Ground(NamedTuple):
-    """Obstacles for a path."""
+    """Obstacles to be avoided by a path."""
 
     ends: Floats
     """Ends (2, 3) of the path: x, y, slack [m]."""
@@ -44,12 +44,12 @@ class Ground(NamedTuple):
 
 @kernel
 def is_point_free(x: float, y: float, margin: float, ground: Ground) -> bool:
-    """Return whether a point of a path is free.
+    """Return whether a point of a path is free of obstacles.
 
     Args:
         x: world x [m].
         y: world y [m].
-        margin: least slack far from the ends [m].
+        margin: minimum slack far from the ends [m].
         ground: obstacles.
     """
     least = margin
@@ -68,14 +68,14 @@ def is_point_free(x: float, y: float, margin: float, ground: Ground) -> bool:
 
 @kernel
 def is_line_free(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Ground) -> bool:
-    """Return whether a straight line is free.
+    """Return whether a straight line is free of obstacles.
 
     Args:
         x0: world x of its first point [m].
         y0: world y of its first point [m].
         x1: world x of its last point [m].
         y1: world y of its last point [m].
-        margin: least slack far from the ends [m].
+        margin: minimum slack far from the ends [m].
         ground: obstacles.
     """
     n = int(math.hypot(x1 - x0, y1 - y0) / SAMPLE_M) + 1
@@ -91,7 +91,7 @@ def is_line_free(x0: float, y0: float, x1: float, y1: float, margin: float, grou
 def find_route(
     start: Point, end: Point, bow: float, discs: Floats, grid: FloorGrid, worker: Worker
 ) -> bool:
-    """Find a path and write it into the worker's record, if there is one.
+    """Find a path and, if there is one, write it into the worker's record.
 
     Args:
         start: first point.
@@ -131,7 +131,7 @@ def find_route(
 
 @kernel
 def is_path_free(ground: Ground, worker: Worker) -> bool:
-    """Return whether the worker's path is free."""
+    """Return whether a worker's path is free of obstacles."""
     n = int(worker.length / SAMPLE_M) + 1
     for k in range(n + 1):
         x, y = locate_on_path(k / n * worker.length, worker)
@@ -142,7 +142,7 @@ def is_path_free(ground: Ground, worker: Worker) -> bool:
 
 @kernel(makes_arrays=True)
 def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
-    """Find a short path by A* and write its corners.
+    """Find the corners of a short path by A*.
 
     Args:
         start: first point.

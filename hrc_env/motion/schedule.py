@@ -1,4 +1,4 @@
-"""Order of the workers' activities: a graph of jobs at kinds of workplaces."""
+"""Order of the workers' activities, as a graph of jobs at kinds of workplaces."""
 
 import itertools
 from collections.abc import Collection, Sequence
@@ -13,38 +13,38 @@ from hrc_env.world import WORKPLACE_KINDS
 HERE = "here"
 """Value of `Job.at` for a job that is done at the worker's current location."""
 ROUTES = ("walk", "push")
-"""Values of `Job.by`, the way to go to the place of a job."""
+"""Values of `Job.by`, the way in which a worker goes to the workplace of a job."""
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
-"""Activities that a job can have."""
+"""Names of the activities that a job can have."""
 HIGHEST_M = 2.2
-"""Greatest height at which hands work [m]."""
+"""Maximum height at which hands work [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A unit of work and the jobs that may follow; weights are relative to their sum."""
+    """A unit of work, with the jobs that may follow and their relative probabilities."""
 
     name: str
     """Name of the job, by which other jobs refer to it."""
     activity: str
     """Name of the activity, one of `DONE_THERE`."""
     at: str
-    """Kind of the workplace (`WORKPLACE_KINDS`), or "here"."""
+    """Kind of the workplace, one of `WORKPLACE_KINDS`, or "here" for the current location."""
     then: tuple[tuple[str, float], ...] = ()
-    """Jobs that may follow, with weights; the errand ends if there are none."""
+    """Names and weights of the jobs that may follow; the errand ends if there are none."""
     begins: float = 0.0
-    """Weight with which an errand begins with this job; 0 for never."""
+    """Relative probability that an errand begins with this job; 0 for never."""
     prop: str = "nothing"
-    """Prop that is picked up or used, or pushed on the way.
+    """Name of the prop that is picked up or used, or pushed on the way.
 
-    If workers walk to the job, they do it where such a prop rests at a place of the kind `at`.
+    If workers walk to the job, they do it where such a prop rests at a workplace of the kind `at`.
     """
     by: str = "walk"
-    """Way to go to the place: "walk", or "push" the prop."""
+    """Way in which the worker goes to the workplace: "walk", or "push" to push the prop there."""
     height_m: float = 0.0
     """Height of the work above the floor [m]; 0 for the workplace's height."""
     waits: bool = False
-    """Whether the job waits for the task's signal; until then the job before it is repeated."""
+    """Whether the job waits for the task's signal, before which the previous job is repeated."""
 
 
 JOBS: tuple[Job, ...] = (
@@ -138,7 +138,7 @@ JOBS: tuple[Job, ...] = (
     Job("do something", "reach", "open", (("stand about", 0.5), ("do something", 0.5)), 0.4),
     Job("look about", "look round", HERE),
 )
-"""Default jobs: wood framing beside a robot that holds the workpiece; judgement."""
+"""Default jobs: wood framing beside a robot that holds the workpiece. The weights are estimates."""
 
 _LOW = tuple(
     Job(name, activity, "robot", ((JOBS[0].name, 1.0),), height_m=height_m)
@@ -150,7 +150,7 @@ _LOW = tuple(
         ("lift what lies there", "lift", 0.0),
     )
 )
-"""Jobs at knee height or lower, done kneeling, squatting or bent over."""
+"""Jobs at or below knee height, which are done kneeling, squatting or bent over."""
 _BOARD = (
     Job("wait for the board", "stand", "robot", (("screw the board on", 1.0),)),
     Job("screw the board on", "screw", "task", (("step aside", 1.0),), waits=True),
@@ -173,7 +173,7 @@ _STACK = (
         (("take from the stack", 0.9), ("look at the work", 0.1)),
     ),
 )
-"""Jobs of `HRCPickPlace-v0`: taking parts from the robot's stack."""
+"""Jobs of `HRCPickPlace-v0`: taking parts from the stack of the robot."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
@@ -187,8 +187,8 @@ WORK: dict[str, tuple[Job, ...]] = {
 }
 """Presets of jobs by name.
 
-In "framing", workers stand upright at the robot; "low_work" adds jobs at its foot (judgement). The
-others belong to tasks in which workers participate.
+In "framing", workers stand upright at the robot; "low_work" adds jobs at its foot, with estimated
+weights. The other presets belong to tasks in which workers participate.
 """
 
 
@@ -221,30 +221,30 @@ def check_jobs(jobs: Sequence[Job]) -> None:
 
 
 class Choice(NamedTuple):
-    """A job that may come next."""
+    """A job that may be chosen, with its weight."""
 
     job: int
     """Index into the schedule's jobs."""
     share: float
-    """Weight of the job; in a `Schedule`, the cumulative share up to 1."""
+    """Relative weight of the job; in a `Schedule`, the cumulative probability."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """Graph of the jobs for which a scene has places."""
+    """Graph of the jobs for which a scene has workplaces."""
 
     jobs: tuple[Job, ...]
-    """Jobs for which there are places."""
+    """Jobs for which there are workplaces."""
     then: tuple[tuple[Choice, ...], ...]
-    """Jobs that may follow each job."""
+    """Choices of jobs that may follow each job."""
     robot: int
     """Index of the first job at the robot."""
     begins: tuple[Choice, ...]
-    """Jobs with which errands away from the robot begin; empty if there are none."""
+    """Choices of jobs with which errands away from the robot begin; possibly empty."""
 
 
 def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
-    """Return the graph of the jobs at given kinds of places; jobs at the robot are always kept."""
+    """Return the graph of the jobs at given kinds of workplaces, and of all jobs at the robot."""
     kept = tuple(job for job in jobs if job.at in (*kinds, "robot", HERE))
     index = {job.name: k for k, job in enumerate(kept)}
     then = tuple(
@@ -257,12 +257,12 @@ def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
 
 
 def _accumulate(weights: list[Choice]) -> tuple[Choice, ...]:
-    """Convert weights of jobs to cumulative shares of their sum."""
+    """Convert the weights of jobs to cumulative probabilities."""
     total = sum(weight for _, weight in weights)
     running = itertools.accumulate(weight / total for _, weight in weights)
     return tuple(Choice(k, share) for (k, _), share in zip(weights, running, strict=True))
 
 
 def pick_job(choices: tuple[Choice, ...], draw: float) -> int:
-    """Return the job selected by a uniform draw in [0, 1); `choices` must not be empty."""
+    """Return the job that a random number in [0, 1) selects; `choices` must not be empty."""
     return next((job for job, share in choices if draw < share), choices[-1].job)

@@ -1,4 +1,4 @@
-"""Start of motion: walks to a place clear of other workers, steps back, and clips."""
+"""Start of walks, steps back and clips, if they do not lead too close to other workers."""
 
 import math
 from collections.abc import Iterable
@@ -33,21 +33,27 @@ from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 WANTS_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
-"""Indices of the draws that decide whether to play a clip instead of an activity, and which."""
+"""Indices of the random numbers that select whether a clip is played, and which clip."""
 FALLS, RUNS, HOW_FAST, HOW_LONG, STAYS_DOWN = range(8, 13)
-"""Indices of a walk's draws: whether to fall or run, speed, time to lie, whether to stay down."""
+"""Indices of a walk's random numbers.
+
+They select whether the worker falls, whether it runs, the speed of the run, the time on the floor
+after a fall, and whether the worker stays down for a longer time.
+"""
 ARRIVED_M = 0.12
-"""Distance to a place within which a worker has arrived [m]."""
-HURRY = (1.0, 0.75)
+"""Distance to the destination within which a worker has arrived [m]."""
+PACE_FACTORS = (1.0, 0.75)
 """Factors of the walking speed that are tried in turn."""
+DETOUR_RESERVE_M = 0.1
+"""Distance added to `APART_M` for the radius of a detour around another worker [m]."""
 STAY_DOWN_S = (15.0, 40.0)
-"""Range of the time on the floor of a worker that stays down [s]; judgement."""
+"""Time for which a worker that stays down lies on the floor [s]. The values are estimates."""
 STUMBLE_TO = ("robot", "open", "floor")
-"""Kinds of places that have room ahead for the arms of a stumbling worker."""
+"""Kinds of workplaces with room ahead for the arms of a stumbling worker."""
 
 
 class Action(NamedTuple):
-    """An activity that begins, with its duration."""
+    """A planned activity and its duration."""
 
     activity: int
     """Index into `ACTIVITY_NAMES`."""
@@ -56,7 +62,11 @@ class Action(NamedTuple):
 
 
 def set_out(decision: Decision) -> Action | None:
-    """Begin to walk to a place of the job, if a place and a path to it are free."""
+    """Begin to walk to a workplace of the job, if a workplace and a path to it are free.
+
+    Returns:
+        The walk, or None if no workplace can be reached.
+    """
     job, worker = decision.job, decision.worker
     if worker.travel == UNDER_WAY and worker.place_kind == ON_STAGE:
         place = Place(*worker.place.tolist())
@@ -69,47 +79,60 @@ def set_out(decision: Decision) -> Action | None:
 
 
 def _set_out_to(decision: Decision, places: Iterable[Place], kind: int) -> Action | None:
-    """Begin to walk to the first place with a free path.
+    """Begin to walk to the first destination that can be reached without meeting another worker.
+
+    For each destination, paths at the speeds of `PACE_FACTORS` are tried in turn. The position at
+    which a path meets another worker becomes an obstacle for the next path to this destination.
 
     Args:
-        decision: inputs of the decision.
-        places: places in the order in which they are tried.
-        kind: kind of the places, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
+        decision: inputs of the decision; if a destination is reachable, the worker's `place`,
+            `place_kind`, `stay_until_s` and `travel` are set.
+        places: destinations in the order in which they are tried.
+        kind: kind of the destinations, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
+
+    Returns:
+        The activity that begins, or None if no destination can be reached. In the latter case the
+        worker's plan is cancelled.
     """
-    mind, worker = decision.mind, decision.worker
+    config, worker = decision.mind.config, decision.worker
     for place in places:
         obstacles = list_obstacles(decision)
-        for share in HURRY:
-            action = _plan_way(decision, place, obstacles, share, kind != ON_STAGE)
+        for pace_factor in PACE_FACTORS:
+            # A plan is written to the worker's record, from which meetings are predicted.
+            action = _plan_way(decision, place, obstacles, pace_factor, to_work=kind != ON_STAGE)
             if action is None:
-                break
+                break  # There is no path at any pace.
             meeting = check_traffic(decision, action)
-            if meeting.time_s < 0.0:
+            if meeting.time_s < 0.0:  # The path meets no other worker.
                 worker.place[:] = place
                 worker.place_kind = kind
-                dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-                worker.stay_until_s = decision.clock_s + action.duration_s + dwell
+                dwell_s = decision.draw(DWELL, config.dwell_s) * config.people.tempo
+                worker.stay_until_s = decision.clock_s + action.duration_s + dwell_s
                 decision.set_travel(UNDER_WAY)
                 if action.activity == st.PUSH:
-                    _take_wheels(decision)
+                    _take_cart(decision)
                 return action
-            obstacles = np.vstack([obstacles, (meeting.x, meeting.y, APART_M + 0.1)])
+            detour = (meeting.x, meeting.y, APART_M + DETOUR_RESERVE_M)
+            obstacles = np.vstack([obstacles, detour])
             cancel_plan(decision)
     cancel_plan(decision)
     return None
 
 
 def _plan_way(
-    decision: Decision, place: Place, obstacles: Floats, share: float, to_work: bool
+    decision: Decision, place: Place, obstacles: Floats, pace_factor: float, to_work: bool
 ) -> Action | None:
-    """Plan to go to a place; return None if there is no path.
+    """Plan to go to a destination.
 
     Args:
         decision: inputs of the decision.
-        place: goal of the path.
+        place: destination of the path.
         obstacles: discs (n, 3) that the path must avoid: x, y, radius [m].
-        share: factor of the worker's walking speed.
-        to_work: whether the worker has a job to do at the place.
+        pace_factor: factor of the worker's walking speed.
+        to_work: whether the worker has a job to do at the destination.
+
+    Returns:
+        The activity and its duration, or None if there is no path.
     """
     mind, job, worker = decision.mind, decision.job, decision.worker
     start = Point(float(worker.start_x), float(worker.start_y))
@@ -117,7 +140,7 @@ def _plan_way(
     bow = 2.0 * decision.draws.item(BOW) - 1.0
     if not find_route(start, end, bow, obstacles, mind.plan.grid, worker):
         return None
-    pace = share * float(worker.speed_m_s)
+    pace = pace_factor * float(worker.speed_m_s)
     free = not decision.is_loaded and job.by == "walk"
     if free and (action := _plan_fall_or_run(decision, place.yaw, pace)):
         return action
@@ -125,7 +148,7 @@ def _plan_way(
     stumbles = decision.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
     if decision.is_loaded:
         activity = st.CARRY
-    elif to_work and job.by == "push" and _has_wheels(decision):
+    elif to_work and job.by == "push" and _has_cart(decision):
         activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
     elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
@@ -133,14 +156,14 @@ def _plan_way(
     return Action(activity, duration_s)
 
 
-def _has_wheels(decision: Decision) -> bool:
-    """Return whether the cart to be pushed is within reach, or the scene has no such cart."""
+def _has_cart(decision: Decision) -> bool:
+    """Return whether the required cart is within reach, or missing from the scene."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     return row >= 0 or not lying.has_load(decision.loads, kind)
 
 
-def _take_wheels(decision: Decision) -> None:
+def _take_cart(decision: Decision) -> None:
     """Remove the cart that the worker will push from the loads at rest."""
     kind = PROP_NAMES.index(decision.job.prop)
     row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
@@ -149,7 +172,7 @@ def _take_wheels(decision: Decision) -> None:
 
 
 def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Action | None:
-    """Plan to fall on the way or to run, if this is drawn and there is room."""
+    """Plan to fall on the way or to run, if a random number selects this and there is room."""
     people, grid = decision.mind.config.people, decision.mind.plan.grid
     worker, draws = decision.worker, decision.draws
     if draws[FALLS] < people.fall_probability:
@@ -166,7 +189,7 @@ def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Ac
 
 
 def step_back(decision: Decision) -> Action | None:
-    """Begin to step back, if there is room behind the worker."""
+    """Begin to step back, or return None if there is no room behind the worker."""
     if decision.is_loaded:
         return None
     plan, worker = decision.mind.plan, decision.worker
@@ -181,7 +204,7 @@ def step_back(decision: Decision) -> Action | None:
 
 
 def cancel_plan(decision: Decision) -> None:
-    """Cancel the plan: the worker stays at the current pose and keeps any load in the hands."""
+    """Cancel the plan, with the worker at its current pose and any load still in its hands."""
     worker = decision.worker
     worker.end_x, worker.end_y, worker.end_yaw = worker.start_x, worker.start_y, worker.start_yaw
     worker.step_count, worker.load_prop = 0, decision.held_prop
@@ -189,7 +212,7 @@ def cancel_plan(decision: Decision) -> None:
 
 
 def has_arrived(decision: Decision) -> bool:
-    """Return whether the worker stands at the place of the errand."""
+    """Return whether the worker stands at the destination of its errand."""
     worker, (x, y, yaw, _) = decision.worker, decision.worker.place.tolist()
     off, turned = math.hypot(worker.start_x - x, worker.start_y - y), worker.start_yaw - yaw
     if PROP_NAMES.index(decision.job.prop) in lying.WHEELED and decision.job.by == "walk":
@@ -198,7 +221,7 @@ def has_arrived(decision: Decision) -> bool:
 
 
 def check_traffic(decision: Decision, action: Action) -> Meeting:
-    """Return when and where an action, if it begins now, comes too close to another worker."""
+    """Predict when and where a worker, if it begins an action now, is too close to another one."""
     if len(decision.workers) == 1:
         return Meeting(-1.0, 0.0, 0.0)
     worker = decision.worker
@@ -207,9 +230,10 @@ def check_traffic(decision: Decision, action: Action) -> Meeting:
 
 
 def begin_clip(decision: Decision) -> Action | None:
-    """Begin to play a clip if one is drawn, or to go to a place with room for it.
+    """Begin to play a randomly selected clip, or to go to a location with room for it.
 
-    After a piece of a clip, the next piece follows if there is room.
+    After a piece of a clip, the next piece follows if there is room. None is returned if no clip is
+    selected or there is no room.
     """
     mind, worker, n_clips = decision.mind, decision.worker, len(decision.mind.clips.count)
     was_clip = worker.activity == st.CLIP
@@ -232,7 +256,7 @@ def begin_clip(decision: Decision) -> Action | None:
 
 
 def _begin_clip_here(decision: Decision, piece: int) -> Action | None:
-    """Begin to play a piece of a clip on the spot, if there is room."""
+    """Begin to play a piece of a clip on the spot, or return None if there is no room."""
     mind, worker = decision.mind, decision.worker
     for turn_rad in TURNS_RAD:
         action = Action(st.CLIP, start_clip(piece, turn_rad, mind.clips, worker))

@@ -1,4 +1,4 @@
-"""Start of activities by index, with the start functions of `activities`."""
+"""Start of the activity with a given index, by the start functions in `activities`."""
 
 import math
 from collections.abc import Callable
@@ -27,22 +27,24 @@ TAKE_M = 0.52
 TAKE_S = 0.8
 """Time for which the hand is held out [s]."""
 BODY_M = 0.36
-"""Least distance of the hands from the worker's root [m]."""
+"""Minimum distance of the hands from the worker's root [m]."""
 OWN_SIDE_M = 0.30
-"""Least distance of the hands from the midline between two workers [m]."""
+"""Minimum distance of a hand's target from the midline between two workers [m]."""
 
 
 def start_going(
     activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, worker: Worker
 ) -> float:
-    """Plan to walk, carry, push or stumble along the worker's path.
+    """Plan to walk, carry a load, push a cart or stumble along the worker's path.
+
+    The plan of carrying is the same as that of walking.
 
     Args:
         activity: index into `ACTIVITY_NAMES`.
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         end_yaw: heading at the end [rad].
         pace_m_s: walking speed [m/s].
-        prop: cart that is pushed, an index into `PROPS`.
+        prop: cart that is pushed, an index into `PROPS`; it is used only by pushing.
         worker: record with the path; the plan is written into it.
 
     Returns:
@@ -60,7 +62,7 @@ def start_take(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to hold out a hand for a tool that the robot offers.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the hand [m].
         worker: record into which the plan is written.
 
@@ -79,19 +81,19 @@ def start_take(draws: Floats, height: float, worker: Worker) -> float:
 
 
 Start = Callable[[Floats, float, Worker], float]
-"""Function that plans an activity from draws (N_START,) in [0, 1), a height [m] and a worker.
+"""Function that plans an activity from random numbers (N_START,), a height [m] and a worker.
 
 It writes the plan into the worker's record and returns the duration [s].
 """
 
 
 def _finish_work(plan: Start) -> Start:
-    """Return a start function that plans and finishes work in place."""
+    """Return a start function that makes and completes a plan of work in place."""
     return lambda draws, height, worker: finish_plan(plan(draws, height, worker), worker)
 
 
 def _finish_load(plan: Start) -> Start:
-    """Return a start function that plans and finishes the handling of a load."""
+    """Return a start function that makes and completes a plan of handling a load."""
     return lambda draws, height, worker: loads.finish_lift(plan(draws, height, worker), worker)
 
 
@@ -114,7 +116,7 @@ STARTS: dict[int, Start] = {
     st.SCREW: _finish_work(wp.plan_screw),
     st.TAKE: start_take,
 }
-"""Start functions of activities on the spot, by activity; each is compiled at first use."""
+"""Start functions of activities on the spot, by activity; each is compiled when first used."""
 
 
 def start_here(
@@ -149,7 +151,7 @@ def start_here(
 
 
 def _start_load(decision: Decision, activity: int, at_rest: Floats) -> float:
-    """Plan to pick up a load from its rest pose, or to lay it down at this pose."""
+    """Plan to pick up a load from its rest pose, or to lay a load down at its rest pose."""
     draws, worker = decision.draws, decision.worker
     if activity == st.PICK_UP:
         prop, on_shoulder = PROP_NAMES.index(decision.job.prop), bool(draws[8] < 0.5)
@@ -167,7 +169,7 @@ def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Poin
     Args:
         x: world x of the target [m].
         y: world y of the target [m].
-        others: places (n, 2) of the other workers [m].
+        others: positions (n, 2) of the other workers [m].
         worker: record of the worker.
     """
     mx, my = worker.start_x, worker.start_y
@@ -186,13 +188,13 @@ def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Poin
 def _draw_target(
     draws: Floats, params: HandParams, near: bool, height: float, worker: Worker
 ) -> Vector3:
-    """Draw a random target of the hands, in the world [m].
+    """Sample a target of the hands, in the world [m].
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
-        height: least height of a target ahead [m].
+        height: minimum height of a target ahead [m].
         worker: record of the worker.
     """
     z = scale_draw(draws[3], *params.target_z_m)
@@ -216,11 +218,11 @@ def start_reach(
     """Plan a random reach: its target, hands, speed and duration.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of reaches.
         near: whether the target is in the robot's workspace instead of ahead of the worker.
-        height: least height of a target ahead [m].
-        others: places (n, 2) of the other workers [m].
+        height: minimum height of a target ahead [m].
+        others: positions (n, 2) of the other workers [m].
         worker: record into which the plan is written.
 
     Returns:
@@ -247,7 +249,7 @@ def start_lift(draws: Floats, params: HandParams, worker: Worker) -> float:
     """Plan a random lift: the load's position, and the times to bend, raise and hold.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         params: settings of lifts.
         worker: record into which the plan is written.
 

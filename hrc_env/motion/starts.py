@@ -1,4 +1,4 @@
-"""Initial states of episodes, with the robots away from people."""
+"""Initial states of episodes in which the robots keep a distance from people."""
 
 from collections.abc import Callable, Mapping
 
@@ -13,9 +13,9 @@ from hrc_env.motion import generator
 from hrc_env.worker.body import Body, worker_truth
 
 APART_M = 0.10
-"""Least distance of a robot's initial pose from a worker's true surface [m]."""
+"""Minimum distance of a robot's initial pose from a worker's true surface [m]."""
 ROBOT_TRIES, TRIES = 8, 40
-"""Number of draws of a robot's start before workers are also redrawn, and of all draws."""
+"""Number of robot starts sampled before the workers are resampled, too; total number of samples."""
 
 
 def begin_apart(
@@ -27,25 +27,25 @@ def begin_apart(
     bodies: Body,
     casts: Mapping[int, generator.Cast] = generator.NOBODY_CAST,
 ) -> JointAngles:
-    """Begin episodes in which the robots start away from the workers.
+    """Begin episodes in which the robots start at a distance from the workers.
 
-    A robot's start that is too close to a worker is drawn again; after `ROBOT_TRIES` draws, the
-    workers are drawn again, too.
+    A start of a robot that is too close to a worker is sampled again; after `ROBOT_TRIES` samples,
+    the workers are sampled again, too.
 
     Args:
         ids: environments (N,).
         draw: function that returns initial joint angles for given environments [rad].
         motion: state of the workers, which is reset.
-        rngs: generators of the workers, one for each environment of the batch.
+        rngs: random number generators of the workers, one for each environment of the batch.
         chain: kinematic chain of the robot.
-        bodies: bodies of the workers.
+        bodies: measurements of the workers' bodies.
         casts: prescribed workers and activities, by environment.
 
     Returns:
         Joint angles (N, n_joints) at which the robots start [rad].
 
     Raises:
-        ConfigError: the robot was too close to a worker in all draws.
+        ConfigError: a robot was too close to a worker in all samples.
     """
     generator.reset(motion, ids, rngs, casts)
     q, near = draw(ids), np.arange(len(ids))
@@ -64,7 +64,7 @@ def begin_apart(
 
 
 def draw_near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngles:
-    """Draw joint angles (len(rngs), N) uniformly within `spread_rad` (N,) of home [rad]."""
+    """Sample joint angles (n_rngs, N) uniformly within `spread_rad` (N,) of `home_q` [rad]."""
     angles = [home_q + rng.uniform(-1, 1, len(spread_rad)) * spread_rad for rng in rngs]
     return np.array(angles).reshape(len(rngs), -1)
 
@@ -81,7 +81,7 @@ def measure_gap_m(
         q: joint angles (N, n_joints) of the robots [rad].
         motion: state of the workers.
         chain: kinematic chain of the robot.
-        bodies: bodies of the workers.
+        bodies: measurements of the workers' bodies.
     """
     truth = worker_truth(bodies, generator.current(motion, ids))
     arm, radius_m = chains.capsules(chain, q), chain.capsule_radius_m

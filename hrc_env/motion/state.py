@@ -1,4 +1,4 @@
-"""State of the workers' motion: one structured array, with axes for environments and workers.
+"""State of the workers' motion, a structured array with axes for environments and workers.
 
 Lengths are in metres, times in seconds, angles in radians. A kernel takes the record of one worker
 (`Worker`) or an array of them. The fields are attributes of `WORKER` rows in Python, too.
@@ -16,9 +16,9 @@ from hrc_env.motion.rows import with_fields
 from hrc_env.worker.body import N_SEGMENTS
 
 MAX_VIA = 8
-"""Greatest number of corners of a path."""
+"""Maximum number of corners of a path."""
 MAX_STEPS = 72
-"""Greatest number of steps of one walk: 30 m at 0.8 m/s with turns at both ends."""
+"""Maximum number of steps of one walk, sufficient for 30 m at 0.8 m/s with turns at both ends."""
 N_ROOTS = 48
 """Number of samples of the root's path that are stored for a clip."""
 N_POINTS = N_SEGMENTS + 4
@@ -28,34 +28,34 @@ N_FRAMES = N_SEGMENTS + 1
 
 
 class Worker:
-    """One simulated worker: body, current activity, the plan of that activity and scratch space.
+    """Record of a worker with body, current activity, the plan of the activity, and scratch space.
 
-    The fields from `start_x` to `roots` are written when an activity begins (`activities`); the
-    closed form of the activity reads them. Yaw, pitch and roll are rotations about z, y and x:
-    world_from_object = Rz(yaw) Ry(pitch) Rx(roll).
+    The fields from `start_x` to `roots` are set when an activity begins, and are the parameters of
+    its closed-form motion (package `activities`). Yaw, pitch and roll are rotations about z, y and
+    x: world_from_object = Rz(yaw) Ry(pitch) Rx(roll).
     """
 
     # The episode.
     is_present: bool
-    """Whether the worker takes part in this episode."""
+    """Whether the worker is present in this episode."""
     body: int
-    """Row of the worker's body in the pool of bodies; the next four fields are its `Anatomy`."""
+    """Row of the worker's body in the pool; the next four fields are the `Anatomy` of this body."""
     bones: Annotated[Floats, (N_SEGMENTS, 3)]
     """Origin of each segment in its parent's frame at rest [m]."""
     frame: Annotated[Floats, (N_SEGMENTS, 3, 3)]
-    """Axes of each limb bone at rest, as rows bone, hinge x bone, hinge; else zero."""
+    """Axes of each limb bone at rest, as rows (bone, hinge x bone, hinge); otherwise zero."""
     lengths: Annotated[Floats, (N_SIZES,)]
-    """Body dimensions [m]; `anatomy` names the columns."""
+    """Body dimensions [m], with the columns described at `anatomy.N_SIZES`."""
     trunk_ends: Annotated[Floats, (N_ROUND, 5)]
     """Ends of the trunk's capsules: segment, position (3) in its frame [m], radius [m]."""
     speed_m_s: float
     """Preferred walking speed [m/s]."""
     squat_share: float
-    """Share of squatting, as opposed to bending the trunk, in a lift."""
+    """Degree of squatting instead of bending the trunk in a lift, from 0 to 1."""
     right_handed: float
-    """Probability of using the right hand if either hand is suitable."""
+    """Probability that the right hand is used if both hands are suitable."""
     phases: Annotated[Floats, (5,)]
-    """Phases of the worker's postural sway [periods]."""
+    """Phases of the worker's postural sway, as fractions of the periods."""
 
     # The current activity and errand.
     clock_s: float
@@ -63,21 +63,21 @@ class Worker:
     activity: int
     """Current activity, an index into `ACTIVITY_NAMES`."""
     time_s: float
-    """Time since the activity began, on the activity's own clock [s]."""
+    """Time since the activity began, on the clock of the activity [s]."""
     duration_s: float
-    """Duration of the activity on its own clock [s]."""
+    """Duration of the activity on the clock of the activity [s]."""
     pace: float
     """Rate of the activity's clock: 1 as planned, 0 if halted, negative for reversed motion."""
     wanted_pace: float
     """Target value of `pace`."""
     blend: Annotated[Floats, (c.N_BLENDED, 2)]
-    """Decaying difference from the previous activity's controls: value and rate at time 0."""
+    """Difference from the controls of the previous activity: value and rate at time 0."""
     stance: Annotated[Floats, (2, 5)]
-    """Footprints of the left and right foot at the beginning; columns as in `footprints`."""
+    """Footprints of the left and right foot at the beginning, with the columns of `footprints`."""
     footprints: Annotated[Floats, (MAX_STEPS, 5)]
-    """Footprint of each step: x, y [m], heading [rad], share of a full stride, height [m]."""
+    """Footprint of each step: x, y [m], heading [rad], step length / full stride, height [m]."""
     place: Annotated[Floats, (4,)]
-    """Workplace of the errand: x, y [m], heading [rad], height of the work [m]."""
+    """Destination of the errand: x, y [m], heading [rad], height of the work [m]."""
     stay_until_s: float
     """Episode time until which the worker stays at the workplace [s]."""
     waiting_since_s: float
@@ -87,13 +87,13 @@ class Worker:
     travel: int
     """Progress of the errand: `THERE`, `UNDER_WAY` or `WAITING`."""
     place_kind: int
-    """Kind of the workplace, an index into `WORKPLACE_KINDS`, or `NOWHERE` or `ON_STAGE`."""
+    """Kind of the destination, an index into `WORKPLACE_KINDS`, `NOWHERE` or `ON_STAGE`."""
 
     # The worker and the robot.
     robot_world: Annotated[Floats, (2, 3)]
-    """Elbow and tool of the robot when last observed, in the world [m]; initially infinite."""
+    """World positions of the robot's elbow and tool when last observed [m]; initially infinite."""
     reacts_at_s: float
-    """Episode time of the worker's next reaction to the robot [s]; infinite if none is due."""
+    """Episode time of the worker's next reaction to the robot [s]; infinite if none is pending."""
     current_reaction: int
     """Current reaction: `NO_REACTION`, `PAUSE` or `BACK_AWAY`."""
     reaction_until_s: float
@@ -101,27 +101,27 @@ class Worker:
     calm_until_s: float
     """Episode time until which the worker does not react again [s]."""
     reaction_delay_s: float
-    """Delay of the next reaction [s], drawn when an activity begins."""
+    """Delay of the next reaction [s], sampled when an activity begins."""
     planned_reaction: int
-    """Kind of the next reaction, drawn when an activity begins."""
+    """Kind of the next reaction, sampled when an activity begins."""
     reaction_s: float
-    """Duration of the next reaction [s], drawn when an activity begins."""
+    """Duration of the next reaction [s], sampled when an activity begins."""
     signal: int
-    """Current stage of the task's signal, see `reactions.follow_signal`."""
+    """Current stage of the task's signal, as defined in `reactions.follow_signal`."""
 
     # The plan of the activity: where it begins and ends, its steps, the load.
     start_x: float
-    """World x of the root at the beginning [m]."""
+    """World x of the root when the activity begins [m]."""
     start_y: float
-    """World y of the root at the beginning [m]."""
+    """World y of the root when the activity begins [m]."""
     start_yaw: float
-    """Heading at the beginning [rad]."""
+    """Heading when the activity begins [rad]."""
     end_x: float
-    """World x of the root at the end [m]."""
+    """World x of the root when the activity ends [m]."""
     end_y: float
-    """World y of the root at the end [m]."""
+    """World y of the root when the activity ends [m]."""
     end_yaw: float
-    """Heading at the end [rad]."""
+    """Heading when the activity ends [rad]."""
     step_start: float
     """Time at which the first foot lifts off [s]."""
     step_period: float
@@ -129,13 +129,13 @@ class Worker:
     step_swing: float
     """Duration of a foot's swing [s]."""
     step_first: int
-    """Foot of the first step: 0 left, 1 right."""
+    """Foot that takes the first step: 0 left, 1 right."""
     step_count: int
     """Number of steps."""
     undo_at: float
     """Time from which the steps are retraced in reverse order [s]; 0 for never."""
     total_s: float
-    """Duration of an activity with a second half that mirrors the first [s]."""
+    """Duration of an activity in which the second half reverses the first half in time [s]."""
     load_prop: int
     """Prop that is carried from one activity to the next, an index into `PROPS`; 0 for nothing."""
     load_at: Annotated[Floats, (6,)]
@@ -143,17 +143,17 @@ class Worker:
     load_grip: Annotated[Floats, (6,)]
     """Grips of the left and the right hand in the load's frame [m]."""
     load_used: Annotated[Floats, (2,)]
-    """1 for each hand, left and right, that holds the load, else 0."""
+    """Flags of the left and the right hand: 1 if it holds the load, otherwise 0."""
 
     # Walking, running, falling, pushing.
     sharpest: float
-    """Greatest curvature of the path [1/m]."""
+    """Maximum curvature of the path [1/m]."""
     n_pieces: int
-    """Number of pieces of the path."""
+    """Number of lines and arcs of the path."""
     length: float
     """Length of the path [m]."""
     path: Annotated[Floats, (2 * MAX_VIA + 1, 6)]
-    """Pieces of the path, lines and arcs; `paths` explains the columns."""
+    """Lines and arcs of the path, one per row; the module `paths` explains the columns."""
     depart: float
     """Time at which the root starts to move [s]."""
     ramp: float
@@ -167,15 +167,15 @@ class Worker:
     turn_in_s: float
     """Duration of the turn into the path [s]."""
     turn_out: float
-    """Angle of the turn from the path's direction to the final heading [rad]."""
+    """Angle from the path's final direction to the final heading [rad]."""
     turn_out_s: float
     """Duration of the turn out of the path [s]."""
     turn_out_at: float
     """Time at which the turn out of the path begins [s]."""
     follow: float
-    """1 to face along the path, 0 to keep the heading and side-step."""
+    """Orientation on the path: 1 to face along it, 0 to keep the heading and side-step."""
     trip_at: float
-    """Time at which the foot is caught in a stumble or fall [s]."""
+    """Time at which a foot is caught in a stumble or fall [s]."""
     trip: float
     """Severity of the stumble in [0, 1]; 0 for none."""
     flight_s: float
@@ -183,11 +183,11 @@ class Worker:
     fall_yaw: float
     """Direction of the fall [rad]."""
     fall_pace: float
-    """Rate of the fall relative to `falling.POSES`."""
+    """Speed of the fall relative to `falling.POSES`."""
     lie_s: float
     """Time for which the worker lies on the floor [s]."""
     lie_roll: float
-    """Rotation of the lying trunk about its long axis [rad]; positive to the left."""
+    """Rotation of the lying trunk about its long axis [rad], positive to the left."""
     front: int
     """Foot on which the worker gets up first: 0 left, 1 right."""
     fall_x: float
@@ -199,15 +199,15 @@ class Worker:
     tilt: float
     """Tilt of a wheelbarrow while it is pushed [rad]."""
     stoop: float
-    """Lean of the trunk towards the handles, see `posture.lean`."""
+    """Lean of the trunk towards the handles of a cart, as defined in `posture.lean`."""
 
     # Reaching, lifting, work in place.
     lean: float
-    """Lean of the trunk at full reach, see `posture.lean`."""
+    """Lean of the trunk at full reach, as defined in `posture.lean`."""
     twist: float
-    """Turn of the trunk at full reach [rad]."""
+    """Twist of the trunk at full reach [rad]."""
     squat: float
-    """Share of the lean that is achieved by bending the knees."""
+    """Fraction of the lean that is achieved by bending the knees."""
     out_at: float
     """Time at which the hands start to move [s]."""
     out_s: float
@@ -217,9 +217,9 @@ class Worker:
     back_s: float
     """Time that the hands need to return [s]."""
     target: Annotated[Floats, (6,)]
-    """Targets of the grips of the left and the right hand in the world [m]."""
+    """World positions of the targets of the left and the right grip [m]."""
     hands_used: Annotated[Floats, (2,)]
-    """1 for each hand, left and right, that moves to its target, else 0."""
+    """Flags of the left and the right hand: 1 if it moves to its target, otherwise 0."""
     gaze_yaw: float
     """Yaw of the head towards the work [rad]; left is positive."""
     gaze_pitch: float
@@ -231,7 +231,7 @@ class Worker:
     fidget_hz: float
     """Frequency of the small movements of hands at the target of a reach [Hz]."""
     raised: Annotated[Floats, (6,)]
-    """Grips of the left and the right hand when the load is raised, in the world [m]."""
+    """World positions of the left and the right grip when the load is raised [m]."""
     raise_s: float
     """Time to raise the load [s]."""
     carry_s: float
@@ -239,9 +239,9 @@ class Worker:
     settle_s: float
     """Time to lower the body to the work [s]."""
     kneel: float
-    """Share of kneeling: 1 on one knee, 0 upright."""
+    """Degree of kneeling, from 0 (upright) to 1 (on one knee)."""
     crouch: float
-    """Share of squatting: 1 in a full squat, 0 upright."""
+    """Degree of squatting, from 0 (upright) to 1 (full squat)."""
     ahead: float
     """Displacement of the root along the heading while the body is lowered [m]."""
     tool: int
@@ -257,9 +257,9 @@ class Worker:
     shoulder_s: float
     """Time to move a load from in front of the body to the shoulder [s]."""
     is_hidden: bool
-    """Whether the load is invisible unless gripped, because another person holds it."""
+    """Whether the load is shown only while gripped, since another person holds it otherwise."""
     stroke: int
-    """Kind of stroke, see `strokes`."""
+    """Kind of stroke, one of the constants in `activities.strokes`."""
     stroke_m: float
     """Size of a stroke [m]."""
     stroke_hz: float
@@ -287,7 +287,7 @@ class Worker:
 
     # Playing a clip.
     clip_row: int
-    """First frame of the clip among the frames of all clips."""
+    """Index of the clip's first frame in `Clips.frames`."""
     clip_frames: int
     """Number of frames of the clip."""
     clip_fps: float
@@ -295,23 +295,23 @@ class Worker:
     clip_yaw: float
     """Heading at which the clip is played [rad]."""
     clip_s: float
-    """Duration of playing the frames [s]."""
+    """Duration of the playback [s]."""
     roots: Annotated[Floats, (N_ROOTS, 2)]
-    """World x, y of the root at equal intervals over the clip [m]; other workers avoid it."""
+    """World x, y of the root at equal intervals over the clip [m], avoided by other workers."""
 
     # Scratch space of the kernels.
     q: Annotated[Floats, (c.N_CONTROLS,)]
-    """Current control vector, see `controls`."""
+    """Current control vector, with the columns in `controls`."""
     p: Annotated[Floats, (N_POINTS, 3)]
     """Origins of the segments in the world [m], followed by auxiliary points."""
     r: Annotated[Floats, (N_FRAMES, 3, 3)]
     """Rotation world_from_segment of each segment, followed by an auxiliary rotation."""
     later_p: Annotated[Floats, (N_POINTS, 3)]
-    """Value of `p` a short time later [m], for velocities."""
+    """Value of `p` a short time later [m], from which velocities are computed."""
     later_r: Annotated[Floats, (N_FRAMES, 3, 3)]
-    """Value of `r` a short time later, for angular velocities."""
+    """Value of `r` a short time later, from which angular velocities are computed."""
     goals: Annotated[Floats, (6,)]
-    """Targets of both hands in the world while work is planned [m]."""
+    """World positions of the targets of both hands, used while work is planned [m]."""
     handover: Annotated[Floats, (2, c.N_BLENDED)]
     """Control vector at the end of an activity and a short time later, for blending."""
     fall_share: float
@@ -332,7 +332,7 @@ class WorkerRow(np.void):
 WORKER = np.dtype((WorkerRow, dtype_of(Worker)))
 """NumPy data type of a `Worker`; the fields of its rows are attributes in Python, too."""
 N_START = 16
-"""Number of uniform draws that a start function may use."""
+"""Number of uniform random numbers available to a start function."""
 
 STAND, WALK, REACH, LIFT, TURN, CARRY, PUSH, STUMBLE, STEP_BACK, LOOK_ROUND = range(10)
 PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = range(10, 18)
@@ -371,18 +371,18 @@ ACTIVITY_NAMES = (
 )
 """Name of each activity, by its index."""
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
-"""Activities that are computed by the closed form of a walk."""
+"""Activities with the closed-form motion of a walk."""
 IDLE = (STAND, LOOK_ROUND)
-"""Activities in which a load is merely held."""
+"""Activities in which a load is held without being moved."""
 TAKING = (PICK_UP, RECEIVE)
-"""Activities that are computed by the closed form of picking up."""
+"""Activities with the closed-form motion of picking up a load."""
 GIVING = (SET_DOWN, HAND_OVER)
-"""Activities that are computed by the closed form of picking up, reversed in time."""
+"""Activities with the closed-form motion of picking up a load, reversed in time."""
 WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
-"""Activities that a job cannot have."""
+"""Activities not available to jobs."""
 NOWHERE = -1
 """Value of `place_kind` for a worker without an errand."""
 ON_STAGE = -2
-"""Value of `place_kind` for a location with room to play a clip."""
+"""Value of `place_kind` if the destination is a location with room to play a clip."""
 THERE, UNDER_WAY, WAITING = range(3)
 NO_REACTION, PAUSE, BACK_AWAY = range(3)

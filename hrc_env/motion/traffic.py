@@ -15,29 +15,29 @@ from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import measure_travel
 
 APART_M = 0.80
-"""Least distance between two roots [m]: the width of a person with arms, and a reserve."""
+"""Minimum distance between two roots [m], the width of a person with arms plus a reserve."""
 AHEAD_M = 0.48
 """Distance of the hands and head of a working person ahead of the root [m]."""
 HANDS_M = 0.76
-"""Least distance of another worker's root from the hands of a working person [m]."""
+"""Minimum distance of another worker's root from the hands of a working person [m]."""
 FALL_APART_M = 1.3
-"""Least distance of another worker's root from the root of a falling worker [m]."""
+"""Minimum distance of another worker's root from the root of a falling worker [m]."""
 
 
 class HandsClearance(NamedTuple):
-    """A disc ahead of a worker that other workers avoid."""
+    """Disc ahead of a worker from which other workers keep away."""
 
     ahead: float
     """Distance of the disc's centre ahead of the root [m]; 0 for no disc."""
     apart: float
-    """Least distance of another worker's root from the centre [m]."""
+    """Minimum distance of another worker's root from the centre [m]."""
 
 
 class Meeting(NamedTuple):
-    """The first moment at which a worker comes too close to another."""
+    """Time and position at which a worker first comes too close to another."""
 
     time_s: float
-    """Time from now [s]; -1 for never."""
+    """Time from now [s]; negative (-1) if there is no such moment."""
     x: float
     """World x of the other worker's root at that time [m]."""
     y: float
@@ -47,15 +47,15 @@ class Meeting(NamedTuple):
 PUSHING = HandsClearance(1.0, 0.95)
 """Clearance of a worker that pushes a cart."""
 PLAYING = HandsClearance(0.01, 1.15)
-"""Clearance of a worker that plays a clip, larger by an arm's length on all sides."""
+"""Clearance of a worker that plays a clip, which includes an arm's length on all sides."""
 FALLING = HandsClearance(0.01, FALL_APART_M)
-"""Clearance of a falling worker: distance of head and feet from the pelvis, plus half a body."""
+"""Clearance of a falling worker: distance from pelvis to head or feet, plus half a body."""
 BEHIND_M = 0.40
 """Distance of a kneeling worker's shank behind the root [m]."""
 SHANK_M = 0.66
-"""Least distance of another worker's root from a kneeling worker's shank [m]."""
+"""Minimum distance of another worker's root from a kneeling worker's shank [m]."""
 LOOK_S = 0.12
-"""Time step of the search for meetings [s]; 0.3 m at a closing speed of 2.8 m/s."""
+"""Time step of the search for meetings [s], 0.3 m at a closing speed of 2.8 m/s."""
 
 
 @kernel
@@ -66,7 +66,7 @@ def is_on_path(activity: int) -> bool:
 
 @kernel
 def get_hands_clearance(activity: int) -> HandsClearance:
-    """Return the disc ahead of a worker in an activity that other workers avoid."""
+    """Return the disc, ahead of a worker in an activity, that other workers avoid."""
     if activity == st.PUSH:
         return PUSHING
     if activity == st.CLIP:
@@ -80,7 +80,7 @@ def get_hands_clearance(activity: int) -> HandsClearance:
 
 @kernel
 def predict_root(t: float, worker: Worker) -> Point:
-    """Predict a worker's root on the floor at time t of the activity, also after its end."""
+    """Predict the position of a worker's root at time t of the activity, also after its end."""
     if is_on_path(worker.activity):
         return locate_on_path(measure_travel(t - worker.grasp_s, worker), worker)
     if worker.activity == st.CLIP:
@@ -92,7 +92,7 @@ def predict_root(t: float, worker: Worker) -> Point:
 
 @kernel
 def measure_gap(x: float, y: float, t: float, worker: Worker) -> float:
-    """Return the distance of another root from a worker minus the least allowed distance [m].
+    """Return the distance of another worker's root from a worker, minus the minimum distance [m].
 
     Args:
         x: world x of the other root [m].

@@ -31,11 +31,11 @@ CADENCE_PER_MIN = 96.2
 CADENCE_POWER = 0.468
 """Exponent of the speed in the fit above."""
 SLOWEST_M_S = 0.65
-"""Least speed for the cadence [m/s]; slower starts and turns keep the cadence of this speed."""
+"""Minimum speed for the cadence [m/s]; slower walks have the cadence of this speed."""
 LEG_M = 0.8685772217237624
-"""Leg length at which the fit holds [m]; step periods scale with the square root of leg length."""
+"""Leg length for which the fit holds [m]; step periods scale with the root of the leg length."""
 SWING_SHARE = 0.80
-"""Swing time as a share of the period of a step, at 1 m/s."""
+"""Swing time as a fraction of the period of a step, at 1 m/s."""
 SWING_FAST_SHARE = 0.02
 """Increase of `SWING_SHARE` from 1 m/s to `FASTEST_M_S`."""
 FASTEST_M_S = 1.8
@@ -43,9 +43,12 @@ FASTEST_M_S = 1.8
 MID_STANCE = 0.46
 """Time from landing until the root passes over the footprint, in periods of a step."""
 EARLIER = 0.31
-"""Time by which runners pass over a footprint before walkers would, in periods of a step."""
+"""Time by which a runner passes over a footprint earlier than a walker, in periods of a step."""
 RUN_WIDER_M = 0.015
-"""Increase of half the step width in a run [m], so that a heel clears the shank; judgement."""
+"""Increase of half the step width in a run, with which a heel clears the other shank [m].
+
+The value is an estimate.
+"""
 WALK_HALF_WIDTH_M = 0.04
 """Half the step width at full speed [m]; measured widths are 5 to 9 cm."""
 SHIFT_S = 0.28
@@ -53,40 +56,52 @@ SHIFT_S = 0.28
 TURN_S = 0.5
 """Duration of a turn by an angle of zero [s]."""
 TURN_RATE = 1.7
-"""Angular speed by which the duration of a turn grows with its angle [rad/s]."""
+"""Angular speed that defines the increase of a turn's duration with its angle [rad/s]."""
 SIDE_STEP_M = 0.5
-"""Path length up to which people take small steps instead of turning [m]; judgement."""
+"""Path length up to which workers take small steps without turning [m].
+
+The value is an estimate.
+"""
 CORNER_M_S2 = 1.6
-"""Greatest lateral acceleration in a corner [m/s^2]; judgement."""
+"""Maximum lateral acceleration in a corner [m/s^2]. The value is an estimate."""
 NORMAL_M_S = 1.3
-"""Speed at which the pace is 1, for which the amplitudes below are stated [m/s]."""
+"""Speed at which the relative pace in the amplitudes below is 1 [m/s]."""
 BOB_M = 0.0095
-"""Amplitude of the pelvis's vertical motion at any pace [m]; measured: 2 to 4 cm peak to peak."""
+"""Constant part of the amplitude of the pelvis's vertical motion [m].
+
+Measured peak-to-peak amplitudes are 2 to 4 cm.
+"""
 BOB_PACE_M = 0.0035
-"""Increase of the amplitude of the pelvis's vertical motion per unit of pace [m]."""
+"""Part of the amplitude of the pelvis's vertical motion that is proportional to the pace [m]."""
 BENT_M = 0.026
-"""Lowering of the pelvis from its standing height per unit of pace [m]; judgement."""
+"""Part of the lowering of the pelvis that is proportional to the pace [m].
+
+The value is an estimate.
+"""
 BENT_FAST_M = 0.10
-"""Lowering of the pelvis with the square of the pace above 1 [m]; judgement."""
+"""Part of the lowering of the pelvis that grows with the square of the pace above 1 [m].
+
+The value is an estimate.
+"""
 SWING_SLOW_RAD = 0.05
-"""Amplitude of the upper arm's swing at any pace [rad]."""
+"""Constant part of the amplitude of the upper arm's swing [rad]."""
 SWING_FAST_RAD = 0.104
-"""Increase of the amplitude of the arm swing with the cube of the pace [rad]."""
+"""Part of the amplitude of the arm swing that is proportional to the cube of the pace [rad]."""
 FULL_SWING = 1.1
-"""Pace beyond which the arm swing does not grow."""
+"""Relative pace beyond which the arm swing does not grow."""
 ELBOW_SWING = 0.73
-"""Bend of the elbow as a share of the arm swing."""
+"""Bend of the elbow, as a fraction of the arm swing."""
 LOADED_TWIST = 0.4
-"""Share of the trunk's twist that remains with a load."""
+"""Fraction of the trunk's twist that remains with a load."""
 LURCH_S = 1.4
-"""Duration of a stumble [s]; judgement."""
+"""Duration of a stumble [s]. The value is an estimate."""
 
 
 class Pace(NamedTuple):
     """Parameters of walking along a path."""
 
     follow: float
-    """1 to face along the path, 0 to keep the initial heading."""
+    """Orientation on the path: 1 to face along it, 0 to keep the initial heading."""
     speed_m_s: float
     """Top speed [m/s]."""
     step_s: float
@@ -94,7 +109,7 @@ class Pace(NamedTuple):
 
 
 SIDE_STEP_PACE = Pace(0.0, 0.2, 0.52)
-"""Pace of side steps; judgement."""
+"""Pace of side steps. The values are estimates."""
 
 
 @kernel
@@ -116,7 +131,7 @@ def measure_speed(t: float, worker: Worker) -> float:
 
 @kernel
 def locate_root(t: float, worker: Worker) -> FloorPose:
-    """Return the pose of the walker's root at time t; the heading is not wrapped."""
+    """Return the pose of the walker's root at time t, with an unwrapped heading."""
     s = measure_travel(t, worker)
     x, y = locate_on_path(s, worker)
     turning = min_jerk(t / worker.turn_in_s)
@@ -129,7 +144,7 @@ def locate_root(t: float, worker: Worker) -> FloorPose:
 
 @kernel
 def walk(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of a walker, except for the feet.
+    """Compute the control vector of a walker, except for the feet.
 
     Args:
         t: time since the walk began [s].
@@ -175,7 +190,7 @@ def walk(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _lurch(t: float, trip: float, worker: Worker) -> None:
-    """Add a stumble: the trunk pitches forward and down with the arms out, and recovers.
+    """Add a stumble, in which the trunk pitches forward with the arms out, and recovers.
 
     Args:
         t: time since the foot was caught [s].
@@ -264,8 +279,10 @@ def plan_way(wanted_m_s: float, ramp_s: float, end_yaw: float, worker: Worker) -
 def brake(t: float, worker: Worker) -> float:
     """Replan a walk to stop on the path as soon as possible after time t.
 
-    Feet in the air land as planned. Return the new duration [s], or -1 if the walker is about to
-    arrive and continues.
+    Feet in the air land as planned.
+
+    Returns:
+        The new duration [s], or -1 if the walker is about to arrive and continues.
     """
     t -= worker.grasp_s
     going = max(t - worker.depart, worker.ramp)
@@ -301,10 +318,10 @@ def _plan_turns(end_yaw: float, worker: Worker) -> None:
 
 @kernel
 def plan_steps(first: int, worker: Worker) -> float:
-    """Plan the footprints from a given step on, so that the root passes over them at mid-stance.
+    """Plan the footprints from a given step on, over which the root passes at mid-stance.
 
     Args:
-        first: index of the first step to lay.
+        first: index of the first planned step.
         worker: record with speed and turns; the footprints are written into it.
 
     Returns:
@@ -348,7 +365,7 @@ def _choose_first_foot(worker: Worker) -> int:
 def write_footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, out: Floats, worker: Worker
 ) -> None:
-    """Write the footprint (x, y, heading, height) of a foot beside the root.
+    """Compute the footprint (x, y, heading, height) of a foot beside the root.
 
     Args:
         side: 0 left, 1 right.

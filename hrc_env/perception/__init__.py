@@ -1,1 +1,1 @@
-"""Detection of `Keypoints` in images (`detector`), or without images (`emulator`)."""
+"""Detection of keypoints in images (`detector`) and its emulation without images (`emulator`)."""

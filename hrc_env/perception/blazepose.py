@@ -1,7 +1,7 @@
 """Decoding of BlazePose's output tensors to people, regions of interest and landmarks.
 
-The constants are those of the graphs of MediaPipe 0.10.21. Method: Bazarevsky et al., BlazePose:
-On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
+The constants are those of the graphs of MediaPipe 0.10.21. The method is described by Bazarevsky et
+al., BlazePose: On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
 """
 
 import math
@@ -20,7 +20,7 @@ from hrc_env.core.typing import Floats, Image, Points2, Tensor
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, load_landmarker
 
 MIN_SCORE = 0.5
-"""Minimum detector score and presence score of a person, as in MediaPipe."""
+"""Minimum detector score and minimum presence score of a person, as in MediaPipe."""
 MAX_OVERLAP = 0.3
 """Overlap (intersection over union) above which two boxes belong to the same person."""
 ROI_MARGIN = 1.25
@@ -41,8 +41,8 @@ class Person:
     hip: Points2
     """(2,) midpoint of the hips."""
     rim: Points2
-    """(2,) point on the circle around the whole body; from the hips, it is in the direction of the
-    head of an upright body."""
+    """(2,) point on the circle around the whole body, in the direction from the hips to the head of
+    an upright body."""
 
 
 class DetectorInput(NamedTuple):
@@ -51,13 +51,13 @@ class DetectorInput(NamedTuple):
     image: Tensor
     """(224, 224, 3) image in [-1, 1], with a black border if the original is not square."""
     window: Roi
-    """Window of the original image that `image` covers [px]."""
+    """Window of the original image that is shown in `image` [px]."""
 
 
 def _anchors() -> Floats:
     """Return the centres (2254, 2) of the detector's cells, with strides 8, 16 and 32.
 
-    A grid point of these strides has 2, 2 and 6 cells.
+    The number of cells per grid point is 2, 2 and 6 for these strides.
     """
     parts = []
     for stride, per_cell in ((8, 2), (16, 2), (32, 6)):
@@ -111,7 +111,7 @@ def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
 
 
 def to_image(points: Points2, window: Roi) -> Points2:
-    """Convert points (..., 2) to image pixels from units of a window's side, from its corner."""
+    """Convert points (..., 2), in units of a window's side from its corner, to image pixels."""
     matrix = image_from_crop(window, 1)
     return points @ matrix[:, :2].T + matrix[:, 2]
 
@@ -178,13 +178,13 @@ def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
 
 
 def person_window(person: Person, window: Roi) -> Roi:
-    """Return the region of interest around a person that was found in a square window [px]."""
+    """Return the region of interest around a person found in a square window [px]."""
     hip, rim = to_image(np.array([person.hip, person.rim]), window)
     return window_from_points(hip, rim)
 
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
-    """Decode BlazePose's landmarks: 33 of the body, mid-hip and rim.
+    """Decode BlazePose's landmarks: 33 points of the body, mid-hip and rim.
 
     Args:
         points: (39, 5) x, y, z in crop pixels, and logits of visibility and presence.
@@ -201,7 +201,7 @@ def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
 
 
 def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
-    """Load BlazePose's landmark network as a function on which custom detectors can be based.
+    """Load BlazePose's landmark network as a function, for use in custom detectors.
 
     Custom detectors are registered with `register_detector`.
 
@@ -229,7 +229,7 @@ def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
 
 @kernel
 def _refine(points: Tensor, heat: Tensor, out: Floats) -> None:
-    """Compute the result `out` (35, 3) of `decode_landmarks`, without holding Python's lock."""
+    """Compute the result `out` (35, 3) of `decode_landmarks`, with Python's lock released."""
     for k in range(out.shape[0]):
         x, y = points[k, 0] / np.float64(LANDMARK_SIDE), points[k, 1] / np.float64(LANDMARK_SIDE)
         out[k, 0], out[k, 1] = x, y

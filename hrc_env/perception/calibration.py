@@ -18,37 +18,37 @@ from hrc_env.core.skeleton import JOINTS, MIRROR
 from hrc_env.core.typing import Floats, Ints
 
 FORMAT, VERSION = "hrc_env keypoints", 7
-"""Format of the file, and version of its tables; files of other versions are rejected."""
+"""Name of the file format, and version of its tables. Files of other versions are rejected."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
 """Path of the calibration that is part of the package."""
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
-"""Kinds of joints; the errors of left and right joints are mirror images."""
+"""Kinds of joints. The errors of left and right joints are mirror images."""
 POSTURES = ("standing", "walking", "handling", "folded", "kneeling")
-"""Names of the postures; a body is a mixture of them (`outline.Posture`)."""
+"""Names of the postures. The posture of a body is a mixture of them (`outline.Posture`)."""
 SIGHTS = ("seen", "hidden", "outside")
-"""Visibility of a joint in an image: seen, occluded, or outside the image."""
+"""Values of the visibility of a joint in an image: seen, occluded, or outside the image."""
 N_VIEWS = 8
-"""Number A of viewing directions of a body: front, front left, left and so on."""
+"""Number A of viewing directions of a body: front, front left, left, and so on around the body."""
 KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 """Standard normal deviates at which the quantiles of a confidence are given."""
 BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 """Standard normal deviates at which the quantiles of the factor on a body's errors are given."""
 N_POSES = 32
-"""Number M of poses that represent all poses of the data."""
+"""Number M of poses that represent all poses in the data."""
 N_SEEN = len(JOINTS) + 1
-"""Number of possible counts of seen joints, from 0 to all joints."""
+"""Number of possible values of the number of visible joints, from 0 to all joints."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
 """(V,) reported visibilities at which the standard deviation is given."""
 KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
-"""(J,) index in `KINDS` of each joint's kind."""
+"""(J,) kind of each joint, as an index into `KINDS`."""
 HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
-"""(J,) -1 for right joints, 1 for all others."""
+"""(J,) sign by which errors are mirrored: -1 for right joints, 1 for all others."""
 INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
-"""(J,) index of the next joint towards the trunk; joints of the trunk have their own index."""
+"""(J,) index of the next joint towards the trunk; for joints of the trunk, their index itself."""
 NEXT: Ints = np.where(np.arange(len(JOINTS)) == INNER, np.minimum(MIRROR, INNER), INNER)
-"""(J,) as `INNER`, but the right joints of the trunk have the index of the left joint."""
+"""(J,) index as in `INNER`, but that of the left joint for right joints of the trunk."""
 N_POSTURES, N_KINDS, N_SIGHTS = len(POSTURES), len(KINDS), len(SIGHTS)
-"""Numbers P, K and S of postures, kinds of joints and visibilities of joints."""
+"""Numbers P of postures, K of kinds of joints and S of visibilities."""
 _N_VISIBILITIES = len(VISIBILITY)
 
 
@@ -57,21 +57,22 @@ class Calibration:
     """The parameters of the detector's errors.
 
     Errors in the image are in units of the side of the window around the worker [sides]; x points
-    to the right in that window, and y down. For right joints, x is mirrored. The shapes are
-    annotated (`SHAPES`).
+    to the right in that window, and y points down. For right joints, x is mirrored. The shapes of
+    the tables are given by the annotations (`SHAPES`).
     """
 
     offset_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
-    """(P, K, 3) mean reported position, relative to the true joint: ahead, to the joint's side of
-    the body, up [m]."""
+    """(P, K, 3) mean reported position relative to the true joint, in the directions ahead, to the
+    joint's side of the body, and up [m]."""
     wander_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
     """(P, K, 3) standard deviation of the reported position over time [m]."""
     space_limb: Annotated[Floats, (N_KINDS, 3)]
-    """(K, 3) correlation of the reported position with that of the `NEXT` joint, per axis."""
+    """(K, 3) correlation of the reported position with that of the joint given by `NEXT`, per
+    axis."""
     between_m: Annotated[Floats, (N_KINDS, 3)]
     """(K, 3) standard deviation of `offset_m` between bodies [m]."""
     poses: Annotated[Floats, (len(JOINTS), 3, N_POSES)]
-    """(J, 3, M) poses that represent those of the data, in the coordinates of `outline.pose_of`."""
+    """(J, 3, M) poses that represent those in the data, in the coordinates of `outline.pose_of`."""
     near_m: Annotated[Floats, ()]
     """Distance from the nearest of `poses` (`outline.novelty_m`) up to which a pose counts as known
     [m]."""
@@ -89,33 +90,34 @@ class Calibration:
     body: Annotated[Floats, (N_POSTURES, len(BODY_KNOTS))]
     """(P, Q) quantiles at `BODY_KNOTS` of the logarithm of a factor on the errors of all joints."""
     common: Annotated[Floats, ()]
-    """Share of the variance of the errors' sizes that is due to the factor of `body`; confidences
+    """Fraction of the variance of the errors' sizes that is due to the factor `body`. Confidences
     are correlated with this part."""
     shares: Annotated[Floats, (N_KINDS, 3)]
-    """(K, 3) shares of the variance in a camera that are constant for a view, last for `slow_s`, or
-    are new in every image; their sum is 1."""
+    """(K, 3) fractions of the variance in a camera that are constant for a view, decay with
+    `slow_s`, and are independent in every image. Their sum is 1."""
     slow_s: Annotated[Floats, ()]
-    """Time constant of lasting errors while the worker stands still [s]."""
+    """Time constant of slowly varying errors while the worker stands still [s]."""
     slow_m: Annotated[Floats, ()]
-    """Distance constant of lasting errors: path of the joints over which they decay to 1/e [m]."""
+    """Distance constant of slowly varying errors: path of the joints over which they decay to 1/e
+    [m]."""
     limb: Annotated[Floats, (N_KINDS,)]
     """(K,) correlation of a joint's error with that of the next joint towards the trunk."""
     confidence: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS, len(KNOTS))]
     """(P, S, K, Z) quantiles of the reported visibility at `KNOTS`, in ascending order."""
     follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """(S, K) correlation of the reported visibility with the smallness of the error."""
+    """(S, K) correlation of the reported visibility with the negative size of the error."""
     swap_share: Annotated[Floats, (N_POSTURES, N_VIEWS, 2)]
-    """(P, A, 2) share of the time in which the left and right labels are swapped: those of all
-    joints, and those of the legs only."""
+    """(P, A, 2) fraction of the time in which the left and right labels of all joints, and of the
+    legs only, are swapped."""
     swap_s: Annotated[Floats, (2,)]
     """(2,) time constants of the normal variables that cause swaps in their lower tails [s]."""
     miss_share: Annotated[Floats, (N_POSTURES, N_SEEN)]
-    """(P, 16) share of the time in which a worker is not found, by the number of seen joints from 0
-    to 15."""
+    """(P, 16) fraction of the time in which a worker is not found, by the number of visible joints
+    from 0 to 15."""
     miss_s: Annotated[Floats, ()]
     """Time constant of the normal variable that causes misses in its lower tail [s]."""
     sigma: Annotated[Floats, (N_POSTURES, N_KINDS, _N_VISIBILITIES)]
-    """(P, K, V) reported standard deviation at `VISIBILITY`, as a share of the stature."""
+    """(P, K, V) reported standard deviation at `VISIBILITY`, as a fraction of the stature."""
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
@@ -127,12 +129,12 @@ _POSITIVE = ("size", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 LONGEST_TAIL = 3.0
-"""Greatest allowed value of `tail`, at which a normal vector n is multiplied by 1 + n.n."""
+"""Maximum value of `tail`, at which a normal vector n is multiplied by 1 + n.n."""
 _RENEW = "create a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """Read a calibration file, by default the package's; raise `ConfigError` if it is invalid."""
+    """Read a calibration file (default: the package's); raise `ConfigError` if it is invalid."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
@@ -149,7 +151,7 @@ def changed_ns(path: Path | str) -> int:
 
 @functools.lru_cache(maxsize=8)
 def _read(path: Path, changed: int) -> Calibration:
-    """Read a calibration file; the result is cached until the file changes."""
+    """Read a calibration file, and cache the result until the file changes."""
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:

@@ -1,4 +1,4 @@
-"""Detection of keypoints in crops of all cameras by BlazePose, two crops at a time.
+"""Detection of keypoints by BlazePose in crops of all cameras' images, two crops at a time.
 
 The calling thread renders crops while two other threads run the networks on them. Each of these
 threads has separate interpreters, so that results do not depend on the order of processing.
@@ -47,21 +47,22 @@ SIDE = network.LANDMARK_SIDE
 """Side of the crops [px]."""
 ResultT = TypeVar("ResultT")
 _THREAD = threading.local()
-"""Thread-local storage of the `networks` of a detector's thread."""
+"""Thread-local storage, which contains the `networks` of a detector's thread."""
 KeypointFunction: TypeAlias = Callable[[Image], Floats | None]
 """Function from a crop (256, 256, 3), RGB of uint8, to (J, 3): x, y [px] from the crop's corner and
-confidence in [0, 1] of `core.skeleton.JOINTS`. Joints that are not found have NaN, NaN, 0; the
-result is None if there is no person."""
+confidence in [0, 1] of `core.skeleton.JOINTS`. The row of a joint that is not found is NaN, NaN, 0.
+The result is None if there is no person."""
 DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
     "detector", {"blazepose": None}
 )
-"""Factories of keypoint functions by name; each thread that detects keypoints calls one once."""
+"""Factories of keypoint functions, by name. Each thread that detects keypoints calls the selected
+factory once."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class DetectorConfig:
-    """Settings of the detector: networks and thresholds of detections."""
+    """Settings of the detector: its networks and the thresholds of detections."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {
         "gate_every": "check_every",
@@ -72,22 +73,24 @@ class DetectorConfig:
     """Current names of renamed fields, by their old names."""
 
     min_presence: float = 0.5
-    """Minimum presence score [0..1] of accepted landmarks; the default is MediaPipe's."""
+    """Minimum presence score [0..1] at which landmarks are accepted; the default is that of
+    MediaPipe."""
     check_presence: float = 0.9
-    """Presence score [0..1] below which the detector stage checks a detection."""
+    """Presence score [0..1] below which a detection is verified by the detector stage."""
     check_every: int = 25
-    """Number of detections after which the detector stage always checks one; 25 means once a second
-    at 25 Hz."""
+    """Interval, in detections, at which a detection is verified by the detector stage even if its
+    presence score is high; 25 means once per second at 25 Hz."""
     max_hip_offset: float = 0.25
-    """Maximum distance of the hips from the window's centre, as a share of its side; hips farther
-    away belong to another person."""
+    """Maximum distance of the hips from the centre of the window, as a fraction of its side. Hips
+    farther away are attributed to another person."""
     outside_confidence: float = 0.1
-    """Maximum confidence of joints that the network places outside the image, where it can only
-    guess."""
+    """Maximum confidence of joints that the network locates outside the image, because these
+    positions are extrapolated."""
     search_every: int = 5
     """Number of steps between searches of a camera's whole image while no person is found in it."""
     runtime: str = "litert"
-    """Runtime of the networks: "litert", "openvino" (an extra, faster) or "auto"."""
+    """Runtime of the networks: "litert", "openvino" (faster, an optional extra) or "auto" (OpenVINO
+    if it is installed)."""
     network: str = "full"
     """Landmark network: "lite", "full" or "heavy"; "lite" and "heavy" must be fetched once with
     `python -m hrc_env setup --networks lite heavy`."""
@@ -109,14 +112,14 @@ class DetectorConfig:
 
     @property
     def weights(self) -> tuple[str, ...]:
-        """Names of the weights that the chosen networks need."""
+        """Names of the weights files of the selected networks."""
         landmark = dict.fromkeys((self.network, self.folded_network))
         return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """The detection of a worker in the images of all cameras.
+    """Detection of a worker in the images of all cameras.
 
     For cameras that do not show the worker, pixels are NaN, confidences 0 and standard deviations
     infinite.
@@ -129,7 +132,7 @@ class Detection:
     sigma_px: Floats
     """(C, J) standard deviation of each coordinate [px]."""
     windows: Views
-    """(C,) window of each camera in which the worker was looked for."""
+    """(C,) window of each camera's image in which the worker was detected or searched for."""
     crops: list[Image | None] = field(default_factory=list)
     """(C,) crop of each window, as it was passed to the network."""
 
@@ -139,9 +142,9 @@ class _Networks:
     """The networks of one thread."""
 
     detect: network.PersonDetector
-    """Detector stage, which finds people."""
+    """Detector stage, which locates people."""
     landmark: dict[str, network.Landmarker]
-    """Landmark stages by name, which find joints."""
+    """Landmark stages, which locate joints, by the network's name."""
     registered: KeypointFunction | None
     """Registered function that replaces the landmark stages, or None."""
 
@@ -178,9 +181,10 @@ class PoseDetector(Stateful):
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self.blank: frozenset[int] = frozenset()
-        """Indices of the cameras with a blank image (uniform or mere noise) in the last search."""
+        """Indices of the cameras with a blank image (uniform or only noise) in the last search."""
         self._counts: dict[int, list[int]] = {}
-        """Numbers of consecutive detections in each camera, by track; 0 requires a check."""
+        """Numbers of consecutive detections in each camera, by track; 0 if the next detection must
+        be verified."""
         self._threads: ThreadPoolExecutor | None = None
         self._lender: PoseDetector | None = None
 
@@ -194,7 +198,7 @@ class PoseDetector(Stateful):
         folded: bool = False,
         posture: Sequence[float] = STANDING,
     ) -> Detection:
-        """Detect a worker in one window of each camera, or by a search if there is no window.
+        """Detect a worker in one window per camera, or by a search if there are no windows.
 
         Args:
             source: the present images of the cameras.
@@ -202,7 +206,7 @@ class PoseDetector(Stateful):
             track: number of the worker's track.
             others: windows (C,) of other workers, which a search excludes.
             found: result of `search` in these images; None if it was not called.
-            folded: whether the worker is expected to be folded (`outline.is_folded`).
+            folded: whether the worker is expected to bend, squat or kneel (`outline.is_folded`).
             posture: expected posture (`outline.posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one entry per camera")
@@ -219,7 +223,7 @@ class PoseDetector(Stateful):
         return _no_detection([None] * len(windows))
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Search whole images for people that both networks detect with high confidence.
+        """Search whole images for people, which both networks must detect with high confidence.
 
         Args:
             source: the present images of the cameras.
@@ -246,13 +250,13 @@ class PoseDetector(Stateful):
         return [[window for k, window in known if k == c] for c in range(len(self.cameras))]
 
     def forget(self, track: int) -> None:
-        """Forget a track, so that the detector stage checks its next detection."""
+        """Forget a track, so that its next detection is verified by the detector stage."""
         self._counts.pop(track, None)
 
     def borrow_networks(self, lender: "PoseDetector") -> None:
-        """Use the threads and networks of another detector with the same settings.
+        """Share the threads and networks of another detector with the same settings.
 
-        The lender remains responsible for closing them.
+        The other detector remains responsible for closing them.
         """
         if lender.config != self.config:
             raise ConfigError(
@@ -278,7 +282,7 @@ class PoseDetector(Stateful):
         folded: bool,
         posture: Sequence[float],
     ) -> Detection:
-        """Detect a worker's joints in these windows (C,); see `detect`."""
+        """Detect a worker's joints in the given windows (C,); see `detect`."""
         counts = self._counts.setdefault(track, [0] * len(self.cameras))
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
         seen, doubts = _no_detection(windows), [1.0] * len(windows)
@@ -299,9 +303,10 @@ class PoseDetector(Stateful):
         return seen
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Developed:
-        """Return a developed copy of a crop, because renderers reuse their arrays.
+        """Return a copy of a crop, enhanced by `exposure.develop`.
 
-        The copy is black outside the camera's image.
+        A copy is needed because renderers reuse their arrays. It is black outside the camera's
+        image.
         """
         crop, camera = crop_image(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
@@ -312,7 +317,10 @@ class PoseDetector(Stateful):
         return developed._replace(picture=picture)
 
     def _must_check(self, count: int, camera: int) -> bool:
-        """Return whether the detector stage must check; cameras take turns to spread the cost."""
+        """Return whether the detector stage must verify a detection in a camera.
+
+        Cameras are verified at different steps to distribute the computing time.
+        """
         every = self.config.check_every
         return count == 0 or (count + camera * every // len(self.cameras)) % every == 0
 
@@ -328,7 +336,7 @@ class PoseDetector(Stateful):
         return [result() for result in results]
 
     def _get_threads(self) -> ThreadPoolExecutor:
-        """Return the threads, or those of a lender, and start them if necessary."""
+        """Return the detector's (or the shared) threads, and start them if necessary."""
         if self._lender is not None:
             return self._lender._get_threads()
         if self._threads is None:
@@ -336,7 +344,7 @@ class PoseDetector(Stateful):
         return self._threads
 
     def _run_job(self, job: Callable[[_Networks], ResultT]) -> ResultT:
-        """Run a job with the networks of the present thread, and return its result."""
+        """Run a job with the networks of the current thread, and return its result."""
         if not hasattr(_THREAD, "networks"):
             _THREAD.networks = _make_networks(self.config)
         return job(_THREAD.networks)
@@ -344,7 +352,7 @@ class PoseDetector(Stateful):
     def _write(
         self, seen: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
     ) -> None:
-        """Store the joints (J, 3) found in a window of camera c in a detection."""
+        """Store the joints (J, 3) that were found in a window of camera c in a `Detection`."""
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
@@ -354,14 +362,14 @@ class PoseDetector(Stateful):
 
 
 def _no_detection(windows: Sequence[Roi | None]) -> Detection:
-    """Return an empty detection: no camera shows the worker."""
+    """Return a detection without any camera that shows the worker."""
     shape = (len(windows), N_JOINTS)
     nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
     return Detection(*nothing, list(windows), [None] * len(windows))
 
 
 def _make_networks(config: DetectorConfig) -> _Networks:
-    """Load the networks of one thread."""
+    """Load the networks for one thread."""
     names, runtime = {config.network, config.folded_network}, config.runtime
     landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
@@ -403,8 +411,8 @@ def _find_joints(
     Args:
         crop: (256, 256, 3) crop of the window.
         window: window of the image [px].
-        check: whether the detector stage must confirm the person.
-        folded: whether the person is expected to be folded.
+        check: whether the detector stage must verify the person.
+        folded: whether the person is expected to bend, squat or kneel.
         config: settings of the detector.
         nets: networks of this thread.
 

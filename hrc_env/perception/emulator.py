@@ -1,10 +1,10 @@
-"""Emulation of keypoints without images: projected true joints with BlazePose's errors.
+"""Emulation of keypoints without images: projections of true joints with errors of BlazePose.
 
-The errors are drawn from a calibration that was fitted to the network's detections in rendered
+The errors are sampled from distributions that were fitted to the network's detections in rendered
 images of workers (docs/emulator.md).
 
-In every camera, a window of side s surrounds the worker. It is rotated with the torso, as the
-detector would choose it. The pixel of joint j of kind k in camera c is
+In every camera's image, a window with side s surrounds the worker. Like the detector's window, it
+is rotated with the torso. The pixel of joint j of kind k in camera c is
 
     pixel = projection of (p_j + R (o_k + w_k far n)) + s T (b_k(view) + size whole m_j)
 
@@ -14,19 +14,20 @@ detector would choose it. The pixel of joint j of kind k in camera c is
   far = 1 + tail n.n / 3, all cameras occasionally agree on a wrong, distant position.
 - b is the mean error in the image for 8 viewing directions, mirrored for right joints (`bias`).
   size = exp(log size + spread z), with normal z, is given for seen, hidden and outside joints
-  (`size`, `spread`). whole is a factor on all joints of a body in a camera, drawn from its measured
-  quantiles (`body`).
-- m is the sum of a cos(view) + b sin(view), which is drawn once per episode, a lasting part and a
-  new part. It is mixed with m of the next joint towards the trunk (`shares`, `limb`). T is the
-  rotation of the window.
-- n, z, whole and the lasting part of m are first-order autoregressive processes with the
+  (`size`, `spread`). whole is a factor on all joints of a body in a camera, sampled from its
+  measured quantiles (`body`).
+- m is the sum of a cos(view) + b sin(view) with a and b sampled once per episode, a slowly varying
+  part and an independent part for every image. It is mixed with m of the next joint towards the
+  trunk (`shares`, `limb`). T is the rotation of the window.
+- n, z, whole and the slowly varying part of m are first-order autoregressive processes with the
   coefficient exp(-dt / `slow_s` - dt v / `slow_m`) per step, where v is the mean speed of the
   joints.
-- The reported visibility is drawn from its measured quantiles (`confidence`) by a normal variable
-  that is correlated with the smallness of the errors (`follows`, `common`).
-- Tables are given for bodies that stand, walk, handle something, are folded, and kneel; the
-  posture is computed from the joints (`hrc_env/perception/outline.py`).
-- Occlusion is computed geometrically, by rays against scene, robot, bodies and carried objects.
+- The reported visibility is sampled from its measured quantiles (`confidence`) by a normal variable
+  that is correlated with the negative size of the errors (`follows`, `common`).
+- Tables are given for bodies that stand, walk, handle objects, bend or squat (`folded`), and kneel;
+  the posture is computed from the joints (`hrc_env/perception/outline.py`).
+- Occlusion is computed geometrically, by intersections of rays with the scene, the robot, bodies
+  and carried objects.
 - The labels left and right (of all joints, or of the legs only) are swapped, and a worker is
   missed, while a slow normal variable is in its lower tail (`swap_share`, `miss_share`, `swap_s`,
   `miss_s`); both errors therefore last for several images.
@@ -61,24 +62,24 @@ class EmulatorConfig:
 
     calibration: str = ""
     """Path of a calibration written by `python -m assets.emulator.calibrate`; if empty, that of the
-    package. The tracker uses its deviations and offsets also at perception level `pixels`."""
+    package is used. The tracker uses the standard deviations and offsets of the calibration at
+    perception level `pixels`, too."""
     error_scale: float = 1.0
     """Factor on all position errors; 0 gives the projected true joints. It does not change the
     reported standard deviations."""
     max_error: float = 0.4
-    """Maximum error of a joint in an image, as a share of the side of the window around the
+    """Maximum error of a joint in an image, as a fraction of the side of the window around the
     worker."""
     swap_share: float | None = None
-    """Share of the time in which a camera swaps left and right; None for the calibrated shares,
-    which depend on the view."""
+    """Fraction of the time in which left and right labels are swapped in a camera; None for the
+    calibrated fractions, which depend on the view."""
     miss_share: float | None = None
-    """Share of the time in which a camera does not find a worker; None for the calibrated shares,
-    which depend on the number of joints in sight."""
+    """Fraction of the time in which a worker is not detected in a camera; None for the calibrated
+    fractions, which depend on the number of visible joints."""
     min_joints: int = 1
-    """Minimum number of joints (of 15) in sight of a camera for it to find a worker."""
+    """Minimum number of joints (of 15) that must be visible to a camera for a detection."""
     outside_confidence: float = 0.1
-    """Maximum confidence of joints outside the image, where they are guesses; as in
-    `DetectorConfig`."""
+    """Maximum confidence of joints outside the image, as in `DetectorConfig`."""
 
     def __post_init__(self) -> None:
         check_fields(self, "not be negative", "error_scale", "max_error")
@@ -87,7 +88,7 @@ class EmulatorConfig:
         self.make_calibration()
 
     def make_calibration(self) -> Calibration:
-        """Return the calibration with these settings; raise `ConfigError` for an invalid file."""
+        """Return the calibration modified by the settings; raise `ConfigError` if it is invalid."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -100,23 +101,24 @@ class EmulatorConfig:
 
 @dataclass(frozen=True, slots=True)
 class EmulatorState:
-    """State of the detector's errors, which evolve from image to image, in standard deviations."""
+    """State of the detector's errors, which evolve between images, in standard deviations."""
 
     errors: Records3[Errors]
     """(B, C, W) errors in each camera."""
     wander: Floats
-    """(B, W, J, 3) errors in space, which all cameras share: ahead, to the joint's side, up."""
+    """(B, W, J, 3) errors in space, which all cameras have in common: ahead, to the joint's side,
+    up."""
     dt_s: float
     """Time between images [s]."""
 
 
 class Sights(NamedTuple):
-    """The views of joints and workers in cameras."""
+    """Visibilities of joints, and views of workers, in cameras."""
 
     sight: Ints
     """(B, C, W, J) visibility of each joint: `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
     look: Floats
-    """(B, C, W, `N_LOOK`) view of each worker: columns `sightlines.SIDE` to `STEPPING`."""
+    """(B, C, W, `N_LOOK`) view of each worker, in the columns `sightlines.SIDE` to `STEPPING`."""
 
 
 def make_state(
@@ -141,7 +143,7 @@ def make_state(
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Rngs) -> None:
-    """Reset environments `ids`, with errors drawn from their stationary distribution."""
+    """Reset environments `ids`, with errors sampled from their stationary distribution."""
     *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
@@ -165,14 +167,15 @@ def emulate(
     Args:
         state: state of the errors, which is advanced by one image in place.
         rngs: one generator for each environment.
-        truth: (B, W, ...) true state of the workers; their capsules hide joints of all workers.
-        surroundings: (B, ...) scene, carried objects and robot, which also hide joints.
+        truth: (B, W, ...) true state of the workers, with the capsules that occlude joints of all
+            workers.
+        surroundings: (B, ...) scene, carried objects and robot, which also occlude joints.
         cameras: (C,) cameras of the rig.
         config: settings, as given to `make_state`.
-        expected: (B, W, ...) prediction of the tracker, on which reported standard deviations
-            depend. If it is None, or a worker has no track nearby, they are those of an upright
-            person in a search.
-        dim: (B, C) quality of the images; None for usual light.
+        expected: (B, W, ...) prediction of the tracker, on which the reported standard deviations
+            depend. If it is None or a worker has no nearby track, they are those of an upright
+            person found by a search.
+        dim: (B, C) quality of the images; None for normal light.
 
     Returns:
         Keypoints in pixels of the images. For a worker that is not found, pixels are NaN,
@@ -203,7 +206,7 @@ def emulate(
 
 
 def _make_expected(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Expected:
-    """Convert a prediction for the kernels; None is a prediction of this shape without tracks."""
+    """Convert a prediction for the kernels; None is converted to a prediction without tracks."""
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
@@ -212,7 +215,7 @@ def _make_expected(expected: PoseEstimate | None, shape: tuple[int, ...]) -> ker
 
 
 def _make_quality(dim: Quality | None, shape: tuple[int, int]) -> Floats:
-    """Convert the quality of images to an array (B, C, 2) for the kernels; None is usual light."""
+    """Convert the quality of images to an array (B, C, 2) for the kernels; None is normal light."""
     quality = np.zeros((*shape, 2))
     quality[..., kernels.DOUBT] = 1.0 if dim is None else dim.doubt
     quality[..., kernels.OVERLOOKED] = 0.0 if dim is None else dim.missed
@@ -222,7 +225,7 @@ def _make_quality(dim: Quality | None, shape: tuple[int, int]) -> Floats:
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
 ) -> Sights:
-    """Return the view of each joint and each worker in each camera, without errors.
+    """Return the true visibility of each joint and view of each worker in each camera.
 
     Args:
         truth: (B, W, ...) true state of the workers.
@@ -251,7 +254,7 @@ def _make_world(truth: WorkerTruth, surroundings: Surroundings) -> World:
 
 
 def shuffle_workers(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
-    """Shuffle the poses (B, C, W, ...) of each camera, so that they do not identify workers."""
+    """Shuffle the poses (B, C, W, ...) of each camera, so that workers cannot be identified."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):
@@ -276,7 +279,10 @@ def _make_rig(cameras: tuple[PinholeCamera, ...]) -> Records1[ImageCamera]:
 
 @functools.lru_cache(maxsize=16)
 def _make_tables(config: EmulatorConfig, dt_s: float, written_ns: int) -> kernels.Tables:
-    """Return the calibration for the kernels; `written_ns` identifies the version of its file."""
+    """Return the calibration in the format of the kernels.
+
+    The argument `written_ns` identifies the version of the calibration file.
+    """
     known = config.make_calibration()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
     of_posture = {name: getattr(known, name) for name in kernels.POSTURE.names or ()}

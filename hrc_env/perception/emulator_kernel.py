@@ -53,37 +53,39 @@ from hrc_env.perception.sightlines import (
 
 _LEFT_HIP, _RIGHT_HIP = JOINT["left_hip"], JOINT["right_hip"]
 N_NORMALS = 6
-"""Number of normal variables per joint and image: two for lasting errors, two for new errors, one
-for the errors' size and one for the confidence."""
+"""Number of normal variables per joint and image: two for slowly varying errors, two for
+independent errors, one for the errors' size and one for the confidence."""
 SWAPPED, CROSSED, MISSED = range(3)
-"""Mistakes of the detector: left and right labels of all joints or only of the legs are swapped, or
-the worker is not found."""
+"""Kinds of mistakes of the detector: the left and right labels of all joints are swapped, those of
+the legs are swapped, or the worker is not found."""
 DOUBT, OVERLOOKED = range(2)
 """Columns of the quality of an image: factor on errors and standard deviations, and additional
-share of misses."""
+fraction of misses."""
 N_OF_BODY = 4
 """Number of normal variables per worker and image: one for the errors' size and one for each kind
 of mistake."""
 FOLLOWED_M = 0.5
-"""Maximum distance between the hips of a track and those of a worker at which the track's windows
-show the worker: about `DetectorConfig.max_hip_offset` of a window's side [m]."""
+"""Maximum distance between the hips of a track and those of a worker at which the windows of the
+track show the worker [m]. It corresponds approximately to `DetectorConfig.max_hip_offset`, which is
+relative to the window's side."""
 FIRST_OF_LEGS = JOINT["left_knee"]
-"""First of the joints that are swapped with the legs."""
+"""Index of the first of the joints that are swapped if the labels of the legs are swapped."""
 
 
 class Errors:
     """The state of the errors of a worker in a camera, in standard deviations."""
 
     lasting: Annotated[Floats, (N_JOINTS, 2, 2)]
-    """Errors that are constant over the episode: joint, x or y, cosine or sine of the view."""
+    """Errors that are constant over the episode, as coefficients of the cosine and the sine of the
+    view; the axes are joint, x or y, and cosine or sine."""
     slow: Annotated[Floats, (N_JOINTS, 2)]
     """Slowly varying errors along x and y."""
     size: Annotated[Floats, (N_JOINTS,)]
-    """Logarithm of the size of each joint's errors, without the factor of the whole body."""
+    """Logarithm of the size of each joint's errors, without the factor on the whole body."""
     sure: Annotated[Floats, (N_JOINTS,)]
     """Part of each joint's confidence that is independent of the errors' size."""
     body: float
-    """Logarithm of the whole body's factor on the errors' size."""
+    """Logarithm of the factor on the errors' sizes of the whole body."""
     happening: Annotated[Floats, (3,)]
     """Normal variables that cause `SWAPPED`, `CROSSED` and `MISSED` in their lower tails."""
 
@@ -92,67 +94,72 @@ class PostureTables:
     """The part of a calibration that depends on the posture; see `calibration.Calibration`."""
 
     offset_m: Annotated[Floats, (N_KINDS, 3)]
-    """Mean reported position relative to the true joint: ahead, to the joint's side, up [m]."""
+    """Mean reported position relative to the true joint, in the directions ahead, to the joint's
+    side and up [m]."""
     wander_m: Annotated[Floats, (N_KINDS, 3)]
     """Standard deviation of the reported position over time [m]."""
     tail: float
-    """Weight of rare large errors."""
+    """Weight of rare large errors (`calibration.Calibration.tail`)."""
     size: Annotated[Floats, (N_SIGHTS, N_KINDS)]
     """Logarithm of the standard deviation of each coordinate in units of the window's side."""
     spread: Annotated[Floats, (N_SIGHTS, N_KINDS)]
     """Standard deviation of `size`."""
     body: Annotated[Floats, (len(BODY_KNOTS),)]
-    """Quantiles of the logarithm of the whole body's factor on the errors."""
+    """Quantiles of the logarithm of the factor on the errors of the whole body."""
     confidence: Annotated[Floats, (N_SIGHTS, N_KINDS, len(KNOTS))]
     """Logits of the quantiles of the reported visibility."""
     swap_share: Annotated[Floats, (N_VIEWS, 2)]
-    """Share of the time in which left and right are swapped: for all joints, for the legs only."""
+    """Fraction of the time in which the left and right labels of all joints, and of the legs only,
+    are swapped."""
     miss_share: Annotated[Floats, (N_SEEN,)]
-    """Share of the time in which the worker is not found, by the number of seen joints."""
+    """Fraction of the time in which the worker is not found, by the number of visible joints."""
     sigma: Annotated[Floats, (N_KINDS, len(VISIBILITY))]
-    """Reported standard deviation at `VISIBILITY`, as a share of the stature."""
+    """Reported standard deviation at `VISIBILITY`, as a fraction of the stature."""
 
 
 class Settings:
     """The emulator's settings, and the part of the calibration that is independent of posture."""
 
     space_limb: Annotated[Floats, (N_KINDS, 3)]
-    """Correlation of the reported position in space with that of the `NEXT` joint."""
+    """Correlation of the reported position in space with that of the joint given by `NEXT`."""
     bias: Annotated[Floats, (N_VIEWS, N_KINDS, 2)]
-    """Mean error in the image for each viewing direction, as a share of the window's side."""
+    """Mean error in the image for each viewing direction, as a fraction of the window's side."""
     limb: Annotated[Floats, (N_KINDS,)]
     """Correlation of a joint's error with that of the next joint towards the trunk."""
     follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
-    """Correlation of the reported visibility with the smallness of the error."""
+    """Correlation of the reported visibility with the negative size of the error."""
     shares: Annotated[Floats, (N_KINDS, 3)]
-    """Square roots of the constant, the lasting and the new share of the variance."""
+    """Square roots of the fractions of the variance that are constant, slowly varying and
+    independent."""
     at_rest: float
-    """Time between images, as a share of the time constant of lasting errors for a worker at
-    rest."""
+    """Time between images, as a fraction of the time constant of slowly varying errors for a worker
+    at rest."""
     per_speed: float
     """Increase of `at_rest` with the worker's speed [s/m]."""
     common: float
-    """Square root of the share of the sizes' variance that is due to the whole body's factor."""
+    """Square root of the fraction of the sizes' variance that is due to the factor on the whole
+    body."""
     own: float
-    """Square root of the remaining share of the sizes' variance."""
+    """Square root of the remaining fraction of the sizes' variance."""
     keep: Annotated[Floats, (3,)]
     """Coefficients of the autoregressive processes of `SWAPPED`, `CROSSED` and `MISSED`."""
     error_scale: float
     """Factor on all position errors."""
     max_error: float
-    """Maximum error in the image, as a share of the window's side."""
+    """Maximum error in the image, as a fraction of the window's side."""
     min_joints: float
-    """Minimum number of joints in sight for a worker to be found."""
+    """Minimum number of visible joints for a worker to be found."""
     outside_confidence: float
     """Maximum reported visibility of joints outside the image."""
     stature_of_side: float
-    """Stature of an upright worker, as a share of the window's side."""
+    """Stature of an upright worker, as a fraction of the window's side."""
 
 
 ERRORS = dtype_of(Errors)
 """The dtype of `Errors`."""
 POSTURE = dtype_of(PostureTables)
-"""The dtype of `PostureTables`; it has only floats, so that a row can be viewed as (N,) numbers."""
+"""The dtype of `PostureTables`. It consists of floats only, so that a row can be viewed as an array
+of N numbers."""
 SETTINGS = dtype_of(Settings)
 """The dtype of `Settings`."""
 
@@ -161,13 +168,13 @@ class Tables(NamedTuple):
     """A calibration in the format of the kernels."""
 
     postures: Floats
-    """(P, N) numbers of `PostureTables` for each posture."""
+    """(P, N) tables for each posture; a row contains the numbers of a `PostureTables`."""
     settings: Records1[Settings]
     """(1,) settings and tables that do not depend on the posture."""
 
 
 class Report(NamedTuple):
-    """The reported keypoints, which are the output of the kernels."""
+    """Reported keypoints, the output of the kernels."""
 
     px: Points2
     """(B, C, W, J, 2) pixels; NaN where there is no measurement."""
@@ -178,14 +185,14 @@ class Report(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """The tracker's prediction in the format of the kernels."""
+    """Prediction of the tracker in the format of the kernels."""
 
     joints: Points3
     """(B, W, J, 3) positions of the joints [m]."""
     velocity: Velocities3
     """(B, W, J, 3) velocities of the joints [m/s]."""
     tracked: Bools
-    """(B, W) whether each worker slot has a track."""
+    """(B, W) mask of the worker slots with a track."""
 
 
 class Mistakes(NamedTuple):
@@ -207,7 +214,7 @@ class Between(NamedTuple):
     high: int
     """Index of the entry after the position."""
     part: float
-    """Distance from the entry `low`, as a share of the distance between both entries."""
+    """Distance from the entry `low`, as a fraction of the distance between both entries."""
 
 
 @kernel(makes_arrays=True)
@@ -226,7 +233,7 @@ def emulate_batch(
 
     Args:
         errors: (B, C, W) state of the errors in each camera, which is changed.
-        wander: (B, W, J, 3) state of the errors that all cameras share, which is changed.
+        wander: (B, W, J, 3) state of the errors that all cameras have in common, which is changed.
         normals: (B, N) standard normal numbers: first for bodies, then for images.
         world: workers and surroundings.
         expected: prediction of the tracker.
@@ -278,15 +285,15 @@ def emulate_batch(
 
 @kernel
 def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
-    """Return the index of the track whose image windows show a worker, or -1 if there is none.
+    """Return the index of the track with image windows that show a worker, or -1 if there is none.
 
-    It is the track whose expected middle of the hips is nearest to the worker's, if that is nearer
-    than `FOLLOWED_M`: the detector looks for a person in windows around the expected body.
+    The returned track has the predicted mid-hip nearest to that of the worker, at a distance below
+    `FOLLOWED_M`, because the detector searches for a person in windows around the predicted body.
 
     Args:
         joints: (J, 3) true joints of the worker in the world frame [m].
-        expected: (W, J, 3) joints that the tracker expects, in the world frame [m].
-        tracked: (W,) whether there is a track.
+        expected: (W, J, 3) joints predicted by the tracker, in the world frame [m].
+        tracked: (W,) mask of the slots with a track.
     """
     nearest_m, track = FOLLOWED_M, -1
     for w in range(len(tracked)):
@@ -306,7 +313,8 @@ def _write_sigma(
 ) -> None:
     """Compute the standard deviations that the detector reports.
 
-    They depend on the confidence, the stature and the expected posture, which the detector knows.
+    They depend on the confidence, the stature and the expected posture, which are available to the
+    detector.
 
     Args:
         confidence: (J,) reported visibilities.
@@ -329,11 +337,11 @@ def _advance_wander(
     shared: Settings,
     meant: Points3,
 ) -> None:
-    """Advance the errors that all cameras share, and write the joints with these errors.
+    """Advance the errors common to all cameras, and compute the joints with these errors.
 
-    Each joint has an error of unit variance along three axes of the body: ahead, to the joint's own
-    side, up. It is a mixture of the error of the next joint towards the trunk and of its own error
-    w, which follows an autoregression:
+    Each joint has an error of unit variance along three axes of the body: ahead, to the joint's
+    side, and up. It is a mixture of the error of the next joint towards the trunk (e_parent) and an
+    individual error w, which is a first-order autoregressive process:
 
         w = keep w + sqrt(1 - keep^2) n,    e = r e_parent + sqrt(1 - r^2) w
         displacement = offset + deviation (1 + tail |e|^2 / 3) e
@@ -341,15 +349,15 @@ def _advance_wander(
     with n from `normals`, and the correlation r, offset, deviation and tail from the calibration.
 
     Args:
-        wander: (J, 3) own errors w in standard deviations, changed in place.
+        wander: (J, 3) individual errors w in standard deviations, changed in place.
         normals: (3 J or more,) standard normal numbers.
         joints: (J, 3) true joints in the world frame [m].
-        front: horizontal unit vector to the front of the body in the world frame.
+        front: horizontal unit vector towards the front of the body in the world frame.
         keep: coefficient of the autoregression, 0 to 1.
         posture: tables of the worker's posture.
         shared: tables that do not depend on the posture.
-        meant: (J, 3) receives the joints where the detector believes them, in the world frame [m];
-            an array other than `joints`.
+        meant: (J, 3) receives the joints with errors in the world frame [m]; it must not be the
+            array `joints`.
     """
     renew, error_scale = math.sqrt(1.0 - keep * keep), shared.error_scale
     errors = meant  # the array holds the errors e first, and then the joints
@@ -384,19 +392,19 @@ def _draw_mistakes(
     common: Settings,
     overlooked: float,
 ) -> Mistakes:
-    """Draw the detector's mistakes about a worker in an image.
+    """Sample the detector's mistakes about a worker in an image.
 
-    A mistake happens while a slow normal variable is in its lower tail; the probability of the tail
-    is the share of the time in which the mistake happens.
+    A mistake occurs while a slowly varying normal variable is in its lower tail. The probability of
+    the tail is the fraction of the time in which the mistake occurs.
 
     Args:
         state: state of the errors, which is changed.
         normals: (`N_NORMALS` J + `N_OF_BODY`,) standard normal numbers of the image.
-        n_seen: number of seen joints.
+        n_seen: number of visible joints.
         view: direction from which the camera sees the body [rad].
         here: tables of the worker's posture.
         common: tables that do not depend on the posture.
-        overlooked: additional share of misses.
+        overlooked: additional fraction of misses.
     """
     at = _between_views(view)
     share = here.swap_share
@@ -412,7 +420,7 @@ def _draw_mistakes(
 
 @kernel
 def _advance_mistake(state: Errors, which: int, normals: Floats, keeps: Floats) -> float:
-    """Advance the normal variable of a mistake, and return its cumulative probability."""
+    """Advance the normal variable of a mistake, and return the cumulative probability at it."""
     keep, normal = keeps[which], normals[N_NORMALS * N_JOINTS + 1 + which]
     state.happening[which] = keep * state.happening[which] + math.sqrt(1.0 - keep * keep) * normal
     return 0.5 * math.erfc(-state.happening[which] / math.sqrt(2.0))
@@ -515,7 +523,7 @@ def _write_keypoints(
 
 @kernel
 def _lerp(a: float, b: float, part: float) -> float:
-    """Interpolate linearly between a (part 0) and b (part 1)."""
+    """Interpolate linearly between `a` (`part` 0) and `b` (`part` 1)."""
     return a + part * (b - a)
 
 

@@ -1,7 +1,7 @@
 """Development: enhancement of dark and low-contrast images before they are passed to the networks.
 
 The range of grey levels between the dark and bright parts is stretched, and noise is smoothed.
-Images of usual contrast are returned unchanged, bit for bit. Blank images are also returned
+Images with normal contrast are returned unchanged, bit for bit. Blank images are also returned
 unchanged, because amplified noise might look like a person.
 """
 
@@ -15,68 +15,71 @@ from numpy.typing import NDArray
 from hrc_env.core.typing import Floats, Image
 
 LEAST_CONTRAST = 3.0
-"""Minimum standard deviation of a colour channel, at size `COARSE_PX`, of an image that is not
-blank [grey levels]."""
+"""Minimum standard deviation of a colour channel of an image that is not blank, after a reduction
+of the image to size `COARSE_PX` [grey levels]."""
 LEAST_EDGES, EDGE_SHARE = 0.06, 0.98
-"""Minimum contrast of edges, as a share of the span of grey levels, and the quantile of local
-contrasts that is compared with it. Rooms have 0.1 and more, smooth gradients at most 0.05."""
+"""Minimum contrast of edges, as a fraction of the span of grey levels, and the quantile of local
+contrasts that is compared with it. Images of rooms have values of at least 0.1, and smooth
+gradients of at most 0.05."""
 EDGE_PX, EDGE_SIGMA_PX, EDGE_BORDER_PX = 64, 2.0, 6
 """Size of the image in which edges are measured, standard deviation of the Gaussian that smooths it
 for comparison, and width of the border that is ignored [px]."""
 COARSE_PX = 32
 """Size of the image in which contrast is measured, small enough to average out pixel noise [px]."""
 DULL, DULLEST = 75.0, 60.0
-"""Spans of grey levels below which an image is partly stretched, and below which it is fully
-stretched."""
+"""Spans of grey levels below which the contrast of an image is partly stretched and fully
+stretched, respectively."""
 SPAN = 150.0
-"""Span between the grey levels of the dark and bright parts of a fully stretched image; the lab as
-built has 166."""
+"""Span between the grey levels of the dark and bright parts of a fully stretched image. The default
+scene of the lab has 166."""
 ENDS = (0.01, 0.75, 0.99)
-"""Quantiles of the grey levels that are considered dark, usual and bright."""
+"""Quantiles of the grey levels that are considered dark, typical and bright."""
 GLARE = 2.0
-"""Ratio to the usual grey level above which parts are windows or lamps, which may saturate."""
+"""Ratio to the typical grey level above which parts are considered windows or lamps, which may
+saturate."""
 MOST_NOISE = 20.0
 """Maximum standard deviation to which noise is amplified [grey levels]."""
 SMOOTHED = (4.0, 10.0)
-"""Noise at which smoothing begins, and at which it is complete [grey levels]."""
+"""Standard deviations of the noise at which smoothing begins and is complete, respectively [grey
+levels]."""
 ROUNDING = math.sqrt(1.0 / 12.0)
 """Standard deviation of the rounding error of grey levels."""
 UNEVEN: NDArray[np.float32] = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 """Filter that removes edges and gradients and multiplies noise by six (Immerkaer 1996)."""
 NOISE_STEP = 4
-"""Factor by which an image is reduced before its noise is measured."""
+"""Factor by which the size of an image is reduced before its noise is measured."""
 OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0
-"""Additional independent error in low-contrast images, in units of the usual error, per noise as a
-share of the span; and the maximum factor on errors. Both were fitted to crops
+"""Additional independent error in low-contrast images, in units of the normal error and per noise
+as a fraction of the span; and the maximum factor on errors. Both were fitted to crops
 (`benchmarks.perception.dim`)."""
 USELESS = 0.165
-"""Noise, as a share of the span, above which people are missed in low-contrast images."""
+"""Noise, as a fraction of the span, above which people are missed in low-contrast images."""
 SIGMA_PX = 0.6
 """Standard deviation of the Gaussian that smooths noise [pixels of a crop]."""
 
 
 class Developed(NamedTuple):
-    """An image for the networks."""
+    """An image that is passed to the networks."""
 
     picture: Image
-    """(n, n, 3) the crop itself, or a developed copy."""
+    """(n, n, 3) the original crop, or an enhanced copy."""
     doubt: float = 1.0
-    """Factor on the standard deviations of joints found in the image; 1 at usual contrast."""
+    """Factor on the standard deviations of joints found in the image; 1 at normal contrast."""
     is_usable: bool = True
     """Whether people can be found in the image, that is, it is neither blank nor mostly noise."""
 
 
 class _Tones(NamedTuple):
-    """The range of an image's grey levels."""
+    """Range of the grey levels of an image."""
 
     dark: float
     """Grey level of the dark parts."""
     bright: float
     """Grey level of the bright parts, without windows and lamps."""
     grey: Image
-    """(n, n) image in grey levels."""
+    """(n, n) image converted to grey levels."""
 
     @property
     def span(self) -> float:
@@ -85,7 +88,7 @@ class _Tones(NamedTuple):
 
 
 def is_blank(crop: Image, mask: Image | None = None) -> bool:
-    """Return whether a crop is dark, white, of one colour, or mere noise.
+    """Return whether a crop is dark, white, of a single colour, or only noise.
 
     Args:
         crop: (n, n, 3) RGB.
@@ -101,8 +104,8 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
 def has_edges(crop: Image) -> bool:
     """Return whether a crop (n, n, 3) shows any edge.
 
-    A covered lens, fog or a light that shines into the camera only cause smooth gradients, whatever
-    range of grey levels these span.
+    A covered lens, fog or a light that shines into the camera causes only smooth gradients, even if
+    these span a wide range of grey levels.
     """
     tones = _tones(crop, None)
     size = (EDGE_PX, EDGE_PX)
@@ -113,7 +116,7 @@ def has_edges(crop: Image) -> bool:
 
 
 def develop(crop: Image, mask: Image | None = None) -> Developed:
-    """Stretch the grey levels of a crop of less than the usual contrast, and smooth its noise.
+    """Stretch the grey levels of a crop with low contrast, and smooth its noise.
 
     Args:
         crop: (n, n, 3) RGB; it is not changed.
@@ -144,7 +147,7 @@ def measure_noise(grey: Image) -> float:
 
 
 def noise_factor(noise: float, span: float) -> float:
-    """Return the factor on joints' standard deviations for a noise and a span [grey levels]."""
+    """Return the factor on standard deviations of joints, given noise and span [grey levels]."""
     added = _ramp(span, DULL, DULLEST) * DOUBT * noise / max(span, 1.0)
     return min(math.hypot(1.0, added), MOST_DOUBT)
 
@@ -158,7 +161,7 @@ def _tones(crop: Image, mask: Image | None) -> _Tones:
 
 
 def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
-    """Stretch the grey levels of a crop by a gain, in proportion to the room below and above."""
+    """Stretch the grey levels of a crop by a gain, in proportion to the margins below and above."""
     added = (gain - 1.0) * tones.span
     first = tones.dark - added * tones.dark / max(255.0 - tones.span, 1.0)
     levels = first + gain * (np.arange(256) - tones.dark)

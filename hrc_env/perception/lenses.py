@@ -1,4 +1,4 @@
-"""Lens distortion of rendered pinhole images, and its correction for detected keypoints.
+"""Lens distortion of rendered pinhole images, and correction of detected keypoints for it.
 
 A window of a distorted image is resampled from a pinhole image that is rotated to the window's
 centre and just wide enough to cover the window. Trackers receive keypoints in pinhole pixels.
@@ -25,9 +25,9 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import to_image
 
 WIDEST = float(np.tan(np.radians(78.0)))
-"""Maximum half width of a pinhole image; beyond it, windows are black [focal lengths]."""
+"""Maximum half width of a pinhole image [focal lengths]. Parts of windows beyond it are black."""
 MAPS_KEPT = 64
-"""Number of windows with cached resampling maps."""
+"""Maximum number of windows with cached resampling maps."""
 
 
 class PinholeRenderer(Protocol):
@@ -37,11 +37,11 @@ class PinholeRenderer(Protocol):
     """Side of the rendered images [px]."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Pose the robot and the workers for the following views."""
+        """Set the poses of the robot and the workers for subsequent views."""
         ...
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Render a window of a pinhole camera's image, (size, size, 3) RGB, top row first."""
+        """Render a window (size, size, 3) of a pinhole camera's RGB image, top row first."""
         ...
 
 
@@ -54,9 +54,11 @@ class _Resampling:
     window: Roi
     """Window of the pinhole image that is rendered."""
     x: NDArray[np.float32]
-    """(size, size) column in the rendered image for every pixel, from the first pixel's centre."""
+    """Column coordinates (size, size) in the rendered image from which each output pixel is sampled
+    [px]; 0 is the centre of the first column."""
     y: NDArray[np.float32]
-    """(size, size) row in the rendered image for every pixel, from the first pixel's centre."""
+    """Row coordinates (size, size) in the rendered image from which each output pixel is sampled
+    [px]; 0 is the centre of the first row."""
 
 
 class LensRenderer:
@@ -71,11 +73,11 @@ class LensRenderer:
         self.renderer, self.cameras = renderer, tuple(cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Render a window of a camera's present image, upright, (size, size, 3) RGB."""
+        """Render an upright window (size, size, 3) of a camera's present RGB image."""
         return self.view(self.cameras[camera_index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Render a window of the image of any camera, upright, (size, size, 3) RGB."""
+        """Render an upright window (size, size, 3) of the RGB image of any camera."""
         if camera.lens is None:
             return self.renderer.view(camera, window)
         maps = _resample(camera, window, self.renderer.size_px)
@@ -106,7 +108,7 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
 
 @functools.lru_cache(maxsize=MAPS_KEPT)
 def _resample(camera: PinholeCamera, window: Roi, size: int) -> _Resampling | None:
-    """Return the resampling of a window, or None if the lens images nothing in it."""
+    """Return the resampling map of a window, or None if the lens images nothing in it."""
     middles = (np.arange(size) + 0.5) / size
     places = np.stack(np.meshgrid(middles, middles), -1)
     px = to_image(places, window)
@@ -142,5 +144,8 @@ def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
 
 
 def _pixels(place: Floats, side: float, size: int) -> NDArray[np.float32]:
-    """Convert positions in [0, side] to pixels, counted from pixel centres; NaN is far outside."""
+    """Convert positions in [0, side] to pixel coordinates from the first pixel's centre.
+
+    NaN is converted to a position far outside the image.
+    """
     return np.nan_to_num(place / side * size - 0.5, nan=-size).astype(np.float32)

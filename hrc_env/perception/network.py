@@ -2,7 +2,7 @@
 
 Each thread must load separate functions. LiteRT gives bitwise equal results on all machines with
 the same instruction set. The official landmark network also computes a segmentation mask and world
-landmarks, which take 40 % of its time; `prune` removes them.
+landmarks, which require 40 % of its computing time; `prune` removes these parts.
 """
 
 import functools
@@ -25,14 +25,15 @@ DETECTOR_SIDE = 224
 LANDMARK_SIDE = 256
 """Side of the landmark stage's input [px]."""
 NETWORKS = ("lite", "full", "heavy")
-"""Landmark networks, from the fastest to the most accurate."""
+"""Names of the landmark networks, from the fastest to the most accurate."""
 DETECTOR_OUTPUTS = ("Identity", "Identity_1")
 """Names of the detector's outputs: boxes (1, 2254, 12) and score logits (1, 2254, 1)."""
 LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
 """Names of the landmark network's outputs: landmarks (1, 195), presence score (1, 1) and heatmaps
 (1, 64, 64, 39)."""
 RUNTIMES = ("litert", "openvino", "auto")
-"""Names of the runtimes; "auto" is OpenVINO, an optional extra, if it is installed, else LiteRT."""
+"""Names of the runtimes. "auto" selects OpenVINO (an optional extra) if it is installed, otherwise
+LiteRT."""
 
 
 class PersonTensors(NamedTuple):
@@ -48,7 +49,7 @@ class LandmarkTensors(NamedTuple):
     """Output of the landmark stage."""
 
     points: Tensor
-    """(39, 5) x, y, z in crop pixels, logits of visibility and presence."""
+    """(39, 5) x, y, z in crop pixels, and logits of visibility and presence."""
     presence: float
     """Presence score of a person in [0, 1]."""
     heat: Tensor
@@ -62,7 +63,7 @@ Landmarker: TypeAlias = Callable[[Tensor], LandmarkTensors]
 
 
 def resolve_runtime(name: str) -> str:
-    """Resolve a name of `RUNTIMES`; raise `ConfigError` if it is unknown or not installed."""
+    """Return the runtime for a name in `RUNTIMES`; raise `ConfigError` if it is not available."""
     if name not in RUNTIMES:
         raise make_unknown_name_error("runtime", name, RUNTIMES)
     if name == "openvino":
@@ -84,7 +85,7 @@ def load_person_detector(runtime: str = "litert") -> PersonDetector:
 
 
 def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarker:
-    """Load a landmark stage of `NETWORKS`; raise `WeightsError` if its weights are missing."""
+    """Load a landmark network by name; raise `WeightsError` if its weights are missing."""
     run = _load(f"pose_landmark_{network}", LANDMARK_OUTPUTS, runtime)
 
     def landmark(image: Tensor) -> LandmarkTensors:
@@ -104,7 +105,7 @@ def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
 
 @functools.lru_cache(maxsize=4)
 def _read_pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
-    """Read and prune a model, which takes half a second; the result is cached for all threads."""
+    """Read and prune a model, and cache the result for all threads."""
     return prune(path.read_bytes(), outputs)
 
 
@@ -145,7 +146,7 @@ def prune(content: bytes, outputs: Sequence[str]) -> bytes:
 
 
 def _keep_tensors(model: Any, kept: list[int]) -> None:
-    """Remove all tensors and buffers except `kept`, and renumber them (-1 is an absent input)."""
+    """Remove all tensors and buffers except `kept`, and renumber the rest (-1: absent input)."""
     graph = model.subgraphs[0]
     place = {old: new for new, old in enumerate(kept)}
     place[-1] = -1

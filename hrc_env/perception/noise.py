@@ -1,8 +1,8 @@
-"""Mean offsets and standard deviations between the network's joints and those of our skeleton.
+"""Mean offsets and standard deviations of the network's joints relative to our skeleton.
 
-The real pipeline and its emulator use the same numbers. BlazePose's hips are 17 mm above ours and,
-in a bent person, 60 mm ahead of them. Trackers track the network's joints; published estimates are
-of our joints.
+The pipeline with images and its emulator use the same values. BlazePose's hips are 17 mm above
+those of our skeleton and, if a person bends, 60 mm ahead of them. Trackers estimate the network's
+joints; the estimates that are passed on are converted to the joints of our skeleton.
 """
 
 from collections.abc import Sequence
@@ -26,14 +26,14 @@ from hrc_env.perception.calibration import (
 from hrc_env.perception.outline import STANDING, Facing, facing, mix, novelty_m, posture_of
 
 ERROR: Floats = read_calibration().sigma
-"""(P, K, V) standard deviation of each image coordinate, as a share of the stature, by posture and
-kind of joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
+"""(P, K, V) standard deviation of each image coordinate, as a fraction of the stature, by posture,
+kind of joint (`calibration.KINDS`) and visibility (`VISIBILITY`); see docs/emulator.md."""
 FARTHEST_M = 0.25
-"""Distance from known poses above which the uncertainty of a body grows no further [m]."""
+"""Distance from known poses above which the uncertainty of a body does not increase further [m]."""
 
 
 class Offsets(NamedTuple):
-    """The part of a calibration that converts the network's joints to ours."""
+    """The part of a calibration that relates the network's joints to those of our skeleton."""
 
     tables: Floats
     """(P, K * 6) mean offset (3) [m] and its variance (3) [m^2], by posture and kind of joint, in
@@ -58,7 +58,7 @@ def sigma_px(
     Args:
         confidence: (..., J) reported visibilities.
         stature_px: stature at the joints' distance, broadcast to `confidence` [px].
-        posture: shares of the postures, as returned by `outline.posture_of`.
+        posture: weights of the postures, as returned by `outline.posture_of`.
         known: table `sigma` of a calibration.
 
     Returns:
@@ -74,7 +74,7 @@ def sigma_px(
 
 @kernel
 def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
-    """Return the standard deviation of a joint's coordinates, as a share of the stature.
+    """Return the standard deviation of a joint's coordinates, as a fraction of the stature.
 
     Args:
         confidence: reported visibility.
@@ -93,17 +93,17 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
 
 
 def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> PoseEstimate:
-    """Convert an estimate of the network's joints to one of our joints.
+    """Convert an estimate of the network's joints to an estimate of our skeleton's joints.
 
     Means are shifted by the mean offset of the network's joints (`offset_m`). Covariances increase
-    by the variance of this offset over time and between bodies (`wander_m`, `between_m`), which
-    cameras and frames do not average out. They also increase with the distance of the body from all
-    known poses (`novel`), because such a pose is new or wrong. Velocities, and priors of workers
-    without a track, do not change.
+    by the variance of this offset over time and between bodies (`wander_m`, `between_m`), which are
+    not averaged out over cameras and frames. They also increase with the distance of the body from
+    all known poses (`novel`), because a distant pose is either new or wrong. Velocities and the
+    priors of workers without a track are not changed.
 
     Args:
         estimate: (B, W, ...) estimate of the network's joints.
-        known: a calibration; None for that of the package.
+        known: a calibration; None for the calibration of the package.
     """
     known = known or read_calibration()
     variance_m2 = known.wander_m**2 + known.between_m**2
@@ -118,7 +118,7 @@ def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> Pose
 def _correct_joints(
     mean: Points3, cov: Covariances3, velocity: Velocities3, tracked: Bools, offsets: Offsets
 ) -> None:
-    """Convert the network's joints to ours, in place.
+    """Convert the network's joints to those of our skeleton, in place.
 
     Args:
         mean: (B, W, J, 3) means of the positions, which are changed [m].
@@ -147,12 +147,12 @@ def _correct_joints(
 def _correct_joint(
     joint: Points3, cov: Covariances3, front: Facing, offset: Floats, hand: float
 ) -> None:
-    """Subtract the mean offset of a joint, and add the variance of the offset.
+    """Subtract the mean offset from a joint's position, and add the offset's variance.
 
     Args:
         joint: (3,) mean position, which is changed [m].
         cov: (3, 3) covariance, which is changed [m^2].
-        front: direction to the front of the body.
+        front: horizontal unit vector towards the front of the body.
         offset: (6,) mean offset [m] and variance [m^2]: ahead, to the joint's side, up.
         hand: -1 for a right joint, 1 for others.
     """

@@ -13,26 +13,26 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Points3, Velocities3
 
 UPRIGHT, FOLDED = 0.15, 0.50
-"""Reduction of the shoulders' height above the ankles, as a share of the full height, at which a
-body begins to count as folded, and at which it counts fully. It is below 0.12 in walking and above
-0.3 in bending or kneeling."""
+"""Relative reductions of the shoulders' height above the ankles from which a body is partly and
+fully regarded as folded. The reduction is below 0.12 in walking and above 0.3 in bending or
+kneeling."""
 SQUATS, KNEELS = 0.40, 0.10
-"""Height of the lower knee above its ankle, as a share of the shank's length, at which a folded
-body begins to count as kneeling, and at which it counts fully. It is above 0.5 in squatting and 0
+"""Heights of the lower knee above its ankle, as fractions of the shank's length, below which a
+folded body is partly and fully regarded as kneeling. The height is above 0.5 in squatting and 0
 with a knee on the ground."""
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
-"""Mean speeds of the joints at which a body begins to count as walking, and at which it counts
-fully [m/s]. Hammering has the first speed, slow walking is above the second."""
+"""Mean speeds of the joints above which a body is partly and fully regarded as walking [m/s]. The
+speed is equal to the first value in hammering, and above the second one in slow walking."""
 HANGS, RAISED = 0.10, 0.25
-"""Reduction of a shoulder's height above its wrist, as a share of the arm's length, at which hands
-begin to count as busy, and at which they count fully. Swinging arms have the first value, carrying
-is above the second."""
+"""Reductions of a shoulder's height above its wrist, as fractions of the arm's length, above which
+hands are partly and fully regarded as busy. The reduction is equal to the first value for swinging
+arms, and above the second one in carrying."""
 LEAN_RAD = math.radians(30.0)
-"""Angle from the vertical above which a torso is bent [rad]; the errors of the network `full` are
-then 50 % larger."""
+"""Angle from the vertical above which a torso is regarded as bent [rad]. For bent bodies, the
+errors of the network `full` are 50 % larger."""
 LOW_HIPS = 0.75
-"""Height of the hips above the lower ankle, as a share of the leg's length, below which a body
-squats or kneels; in walking, it stays above 0.9."""
+"""Height of the hips above the lower ankle, as a fraction of the leg's length, below which a body
+is regarded as squatting or kneeling. In walking, it remains above 0.9."""
 
 
 class Facing(NamedTuple):
@@ -45,7 +45,7 @@ class Facing(NamedTuple):
 
 
 class Posture(NamedTuple):
-    """A body's posture as weights of `calibration.POSTURES`; their sum is 1."""
+    """Posture of a body as weights of `calibration.POSTURES`, with a sum of 1."""
 
     standing: float
     """Weight of the posture "standing, with free hands"."""
@@ -65,7 +65,7 @@ STANDING = Posture(1.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def facing(joints: Points3) -> Facing:
-    """Return the direction to the front of a body (J, 3), or +x if it is not defined."""
+    """Return the direction towards the front of a body (J, 3), or +x if it is not defined."""
     left_x = joints[1, 0] - joints[2, 0] + joints[7, 0] - joints[8, 0]
     left_y = joints[1, 1] - joints[2, 1] + joints[7, 1] - joints[8, 1]
     length = math.sqrt(left_x * left_x + left_y * left_y)
@@ -107,13 +107,13 @@ def speed(velocity: Velocities3) -> float:
 
 @kernel
 def stepping(mean_speed_m_s: float) -> float:
-    """Return the degree of walking from 0 (standing) to 1, given the mean speed of the joints."""
+    """Return the degree of walking, from 0 (standing) to 1, for a mean speed of the joints."""
     return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
 
 
 @kernel
 def handling(joints: Points3) -> float:
-    """Return the degree to which a body's (J, 3) hands are busy, from 0 (hanging arms) to 1."""
+    """Return the degree to which hands of a body (J, 3) are busy, from 0 (hanging arms) to 1."""
     most = 0.0
     for side in range(2):
         shoulder, elbow, wrist = 1 + side, 3 + side, 5 + side
@@ -161,7 +161,7 @@ def mix(posture: Posture, tables: Floats, out: Floats) -> None:
 def pose_of(joints: Points3) -> Floats:
     """Return a body's joints (J, 3) relative to mid-hip in body axes: ahead, left and up.
 
-    The unit is the length of the body's trunk and leg.
+    The unit of length is the sum of the lengths of the body's trunk and leg.
     """
     front = facing(joints)
     pose, length_m = np.empty((len(joints), 3)), _length_m(joints)
@@ -190,7 +190,7 @@ def novelty_m(joints: Points3, poses: Floats) -> float:
 
 @kernel
 def _length_m(joints: Points3) -> float:
-    """Return the length of the trunk and leg of a body (J, 3), as the mean of both sides [m]."""
+    """Return the total length of trunk and leg of a body (J, 3), averaged over both sides [m]."""
     length = 0.0
     for side in range(2):
         shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
@@ -209,7 +209,7 @@ def _distance(joints: Points3, i: int, k: int) -> float:
 
 @kernel
 def view_angle(joints: Points3, front: Facing, eye: Floats) -> float:
-    """Return the viewing direction of a body: 0 from its front, pi / 2 from its left.
+    """Return the direction from which a body is seen: 0 from its front, pi / 2 from its left.
 
     Args:
         joints: (J, 3) joints of the body [m].
@@ -227,7 +227,7 @@ def view_angle(joints: Points3, front: Facing, eye: Floats) -> float:
 def is_folded(joints_world: Points3) -> bool:
     """Return whether a body (J, 3) bends, squats or kneels; it is False if joints are NaN.
 
-    The joints of such a body occlude each other, and the network's errors are much larger.
+    The parts of such a body occlude each other, and the network's errors are much larger.
     """
     shoulders, hips, knees, ankles = (joints_world[k : k + 2] for k in (1, 7, 9, 11))
     torso = shoulders.mean(0) - hips.mean(0)

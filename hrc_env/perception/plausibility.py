@@ -1,8 +1,8 @@
-"""Plausibility checks of detections, because networks occasionally mistake robots for people.
+"""Plausibility checks of detections, which exclude robots that are mistaken for people.
 
 If several cameras detect a body, its bones must have plausible lengths. If only one camera detects
-it, it must stand upright at the point where the line of sight to its feet meets the floor, and its
-heights there must be plausible.
+it, the body must stand upright at the point at which the line of sight to its feet meets the floor,
+and the heights of its joints must be plausible for that position.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,15 @@ NEAR_FLOOR_M = 0.5
 GATE_SIGMA = 4.0
 """Maximum reprojection error of cameras that agree on a joint, in standard deviations."""
 BONE_RATIO = 1.42
-"""Maximum plausible ratio between a bone's length and the mean of adults, in either direction."""
+"""Maximum plausible ratio of a bone's length to the mean of adults, or of the mean to the
+length."""
 MIN_BONES = 0.65
-"""Minimum share of all bones that must have plausible lengths."""
+"""Minimum fraction of the bones that must have plausible lengths."""
 LEVELS = tuple(
     [JOINT[f"{side}_{name}"] for side in ("left", "right")]
     for name in ("ankle", "knee", "hip", "shoulder")
 )
-"""Pairs of joints that are used, by their mean heights, to check if a person stands."""
+"""Pairs of joints with mean heights that are used to check whether a person stands."""
 ANKLE_M = 0.1
 """Height of the ankles of a standing person above the floor [m]."""
 LEVELS_M: Floats = np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])
@@ -44,7 +45,7 @@ def is_person(
     cameras: Sequence[PinholeCamera],
     floor_world: Points3 | None,
 ) -> bool:
-    """Return whether the detection of a search is a person.
+    """Return whether a detection found by a search is a person.
 
     Args:
         px: (C, J, 2) joints in pixels of the images.
@@ -66,7 +67,7 @@ def is_person(
 def has_body(
     px: Points2, confidence: Floats, sigma_px: Floats, cameras: Sequence[PinholeCamera]
 ) -> bool:
-    """Return whether joints have the bones of a person.
+    """Return whether the bones between joints have the lengths of those of a person.
 
     Args:
         px: (C, J, 2) joints in pixels of the images of two or more cameras.

@@ -1,8 +1,9 @@
-"""Search for people in whole images, without a prediction, and their association across cameras.
+"""Search for people in whole images without a prediction, and their association across cameras.
 
-The detector stage finds people that fill at least a third of its window's height. If the floor is
-known, the windows are sized for people on it; otherwise they are as large as the image. The lines
-of sight to the hips of one person meet; those to different people or to false detections rarely do.
+The detector stage finds people that fill at least a third of the height of its window. If the floor
+is known, the windows are sized for people on it; otherwise they are as large as the image. Cameras
+are associated by lines of sight to hips: those to the same person meet, and those to different
+people or to false detections rarely do.
 """
 
 import functools
@@ -29,39 +30,40 @@ from hrc_env.perception.exposure import develop, has_edges
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
-"""Maximum angle of view of a search window [rad]; in wider windows, people are too small for the
+"""Maximum angle of view of a search window [rad]. In wider windows, people are too small for the
 detector stage."""
 STATURE_M = 1.75
 """Assumed stature of people for the layout of search windows [m]."""
 STATURE_OF_SIDE = 0.75
-"""Stature of an upright worker, as a share of the side of BlazePose's window around the worker."""
+"""Stature of an upright worker, as a fraction of the side of BlazePose's window around the
+worker."""
 ROOM = 2.1
-"""Side of a search window, in units of a person's height."""
+"""Side of a search window, relative to the height of a person in the image."""
 FITTING = (1.25, 2.8)
-"""Minimum and maximum side of windows in which the detector stage finds most people, in units of a
-person's height."""
+"""Minimum and maximum side of windows in which the detector stage finds most people, relative to
+the height of a person in the image."""
 MEETING_M = 0.3
-"""Maximum distance of a line of sight to the hips from a point at which it shows the same hips
-[m]."""
+"""Maximum distance between a point and a line of sight to hips at which the hips are assumed to be
+at the point [m]."""
 SIDE_M = (1.1, 3.6)
-"""Minimum and maximum side of the detector stage's window at a person's distance: for a crouching
-person, and for a tall person with raised arms [m]."""
+"""Minimum and maximum plausible side of the detector stage's window at a person's distance, for a
+crouching person and for a tall person with raised arms, respectively [m]."""
 SAME = 0.2
-"""Distance between the centres of two windows in one camera, as a share of the side, below which
-both show the same person."""
+"""Distance between the centres of two windows in one camera, as a fraction of the side, below which
+both are assumed to show the same person."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines at which their closest points are well defined."""
 Candidates: TypeAlias = Sequence[Sequence[Roi]]
-"""(C,) windows of the people found in each camera."""
+"""(C,) windows of the people found in each camera's image."""
 Views: TypeAlias = list[Roi | None]
-"""(C,) window of a person in each camera; None for cameras without a window."""
+"""(C,) window of a person in each camera's image; None for cameras without a window."""
 
 
 class ImageSource(Protocol):
     """A source of the present images of all cameras, such as a renderer, cameras or videos."""
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's present image, upright, (256, 256, 3) RGB of uint8."""
+        """Return an upright window (256, 256, 3) of a camera's present image, RGB of uint8."""
         ...
 
 
@@ -110,14 +112,15 @@ class _People(NamedTuple):
 
 
 class _Support(NamedTuple):
-    """The windows of people with hips at a point."""
+    """The windows that support the hypothesis of a person with hips at a point."""
 
     windows: Views
-    """(C,) nearest such window of each camera."""
+    """(C,) window with the nearest line of sight in each camera; None for cameras without
+    support."""
     n_cameras: int
-    """Number of cameras with such a window."""
+    """Number of cameras with a supporting window."""
     error_m: float
-    """Sum of the distances between these windows' lines of sight and the point [m]."""
+    """Sum of the distances between the lines of sight of the windows and the point [m]."""
 
 
 SearchJob: TypeAlias = Callable[[PersonDetector], SearchResult]
@@ -178,9 +181,9 @@ def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) ->
 
     Args:
         camera: the camera.
-        floor_world: (N, 3) points where people may stand [m]; a small number of windows then shows
-            all of these people in sufficient size. If None, the windows overlap and are as large as
-            image and lens (`SEARCH_RAD`) allow.
+        floor_world: (N, 3) points where people may stand [m]. They are covered by a small number of
+            windows in which people at these points have a sufficient size. If None, the windows
+            overlap and are as large as the image and `SEARCH_RAD` permit.
     """
     if floor_world is not None:
         return _cover_people(_project_people(camera, floor_world))
@@ -201,7 +204,7 @@ def _project_people(camera: PinholeCamera, floor_world: Points3) -> _People:
 
 
 def _cover_people(people: _People) -> list[Roi]:
-    """Return a small set of windows, so that each person is fully inside one of suitable size.
+    """Return a small set of windows of suitable size that fully contain each of the people.
 
     The candidates are windows around each person; the one that covers the most people is selected
     repeatedly.
@@ -222,7 +225,7 @@ def _cover_people(people: _People) -> list[Roi]:
 
 
 def drop_duplicates(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
-    """Remove duplicates from overlapping search windows; return people by camera, best first."""
+    """Remove duplicates from overlapping windows, and return the people by camera, best first."""
     kept: list[list[Roi]] = [[] for _ in range(n_cameras)]
     for each in sorted(found, key=lambda one: -one.score):
         if not any(is_same_person(each.window, other) for other in kept[each.camera]):
@@ -239,9 +242,9 @@ def _middles(length_px: int, side_px: float) -> list[float]:
 def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Views:
     """Return the windows of the person on which the cameras agree best.
 
-    The lines of sight to the hips in these windows meet most closely. In a rig of several cameras,
-    at least two must have found the person, at a plausible size; in a rig of one camera, its first
-    candidate is used.
+    These are the windows with lines of sight to the hips that meet most closely. In a rig of
+    several cameras, at least two must have found the person at a plausible size; in a rig of one
+    camera, the first candidate is used.
 
     Args:
         candidates: (C,) windows of the people found in each camera, best first.
@@ -259,8 +262,8 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
 def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Sighting]:
     """Return the people among candidates (C,).
 
-    People on which several cameras agree come first, in the order of agreement, followed by those
-    found by only one camera.
+    People on which several cameras agree come first, in descending order of agreement, followed by
+    those found by only one camera.
     """
     found: list[Sighting] = []
     while (agreed := _find_agreed(candidates, cameras)) is not None:
@@ -285,7 +288,7 @@ def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Si
 
 
 def _locate_by_size(camera: PinholeCamera, window: Roi) -> Points3:
-    """Return the position (3,) at which an upright person has a window of this size [m]."""
+    """Return the position (3,) [m] at which the window of an upright person has a given size."""
     (x, y), half_px = window.centre_px, window.side_px / 2
     along, edge = rays(camera, np.array([[x, y], [x, y + half_px]]))
     half_m = STATURE_M / STATURE_OF_SIDE / 2
@@ -316,12 +319,12 @@ def exclude_people(candidates: Candidates, others: Sequence[Sequence[Roi | None]
 
 
 def is_same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
-    """Return whether the centres (the hips) of two windows in one camera nearly coincide.
+    """Return whether two windows in one camera have nearly the same centre, that is, hips.
 
     Args:
         window: a window.
         other: another window, or None.
-        share: maximum distance between the centres, as a share of the side of `other`.
+        share: maximum distance between the centres, as a fraction of the side of `other`.
     """
     if other is None:
         return False
@@ -350,7 +353,7 @@ def _find_crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) ->
 def _find_support(
     point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
 ) -> _Support:
-    """Find the candidates (C,) that show hips at a point (3,) [m]."""
+    """Return the support by candidates (C,) for a person with hips at a point (3,) [m]."""
     windows: Views = [None] * len(cameras)
     error_m = 0.0
     for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):

@@ -1,4 +1,4 @@
-"""Kernels for the views of workers in cameras, which process one environment after another."""
+"""Kernels that compute the views of workers in cameras, one environment after another."""
 
 from typing import Annotated, NamedTuple
 
@@ -16,15 +16,15 @@ from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, Window, fit_window
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
-"""Visibility of a joint: seen, occluded, outside the image, or behind the camera."""
+"""Values of the visibility of a joint: seen, occluded, outside the image, or behind the camera."""
 SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
 """Columns that describe the view of a worker: side [px] and rotation [rad] of the window around the
-body, viewing direction (`outline.view_angle`) [rad], and four measures of the posture from the
-functions of `outline` with these names."""
+body, viewing direction (`outline.view_angle`) [rad], and four measures of the posture, which are
+computed by the functions of `outline` with the corresponding names."""
 
 
 class ImageCamera:
-    """A camera with its lens and its image."""
+    """Parameters of a camera, its lens and its image."""
 
     P: Annotated[Floats, (3, 4)]
     """Projection matrix to pinhole pixels."""
@@ -84,7 +84,7 @@ class World(NamedTuple):
 
 @kernel(makes_arrays=True)
 def view_workers(world: World, rig: Records1[ImageCamera], sight: Ints, look_of: Floats) -> None:
-    """Compute the views of joints and workers in cameras, without errors.
+    """Compute the true visibilities of joints and the views of workers in cameras.
 
     Args:
         world: workers and surroundings in B environments.
@@ -138,12 +138,13 @@ def view_worker(
     Args:
         camera: the camera.
         joints: (J, 3) true joints, which are tested for occlusion [m].
-        meant: (J, 3) positions at which the detector places the joints, which are projected [m].
+        meant: (J, 3) positions of the joints including the detector's errors, which are projected
+            [m].
         occluders: all shapes of the environment.
         view: output: the view, except the columns of `look` after `TURN`.
 
     Returns:
-        The number of seen joints.
+        The number of visible joints.
     """
     uv, depth = view.uv, view.depth
     view.look[SIDE], view.look[TURN] = project_worker(camera, meant, uv, depth)
@@ -184,8 +185,8 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
     """Distort pinhole pixels in place, and return the mean magnification of the pinhole image.
 
-    The magnification is the ratio of lengths in the pinhole image to lengths in the image of the
-    lens, at the joint. Joints nearer than `MIN_DEPTH_M` are left as they are and do not count.
+    The magnification at a joint is the ratio of lengths in the pinhole image to lengths in the
+    distorted image. Joints nearer than `MIN_DEPTH_M` are not changed and not included in the mean.
 
     Args:
         camera: the camera.
@@ -193,7 +194,7 @@ def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
         depth: (J,) distances along the camera's axis [m].
 
     Returns:
-        The mean over the joints; 1 if none counts.
+        The mean over the joints; 1 if no joint is included.
     """
     focal_x, focal_y = camera.focal_px[0], camera.focal_px[1]
     centre_x, centre_y = camera.centre_px[0], camera.centre_px[1]

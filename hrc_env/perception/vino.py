@@ -1,8 +1,8 @@
-"""Inference of networks on OpenVINO, an optional extra: pip install "hrc_env[openvino]".
+"""Inference with OpenVINO, which is an optional extra: pip install "hrc_env[openvino]".
 
-OpenVINO evaluates only the operators that the requested outputs need. On processors with 16-bit
-floating-point arithmetic (bf16: AVX512_BF16 or AMX), it takes half of LiteRT's time, and landmarks
-differ by a quarter of a pixel.
+OpenVINO evaluates only the operators that are needed for the requested outputs. On processors with
+16-bit floating-point arithmetic (bf16: AVX512_BF16 or AMX), it requires half of LiteRT's computing
+time, and landmarks differ by a quarter of a pixel.
 """
 
 import functools
@@ -18,7 +18,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Tensor
 
 Network: TypeAlias = Callable[[Tensor], list[Tensor]]
-"""Function from an image (H, W, 3) to copies of the requested outputs; it is not thread-safe."""
+"""Function from an image (H, W, 3) to copies of the requested outputs. It is not thread-safe."""
 INSTALL = 'pip install "hrc_env[openvino]"'
 """Command that installs OpenVINO."""
 
@@ -38,12 +38,12 @@ def check_installed() -> None:
 
 
 def precision() -> str:
-    """Return the precision of networks: "bf16" if the processor supports it, else "f32"."""
+    """Return the precision of inference: "bf16" if the processor supports it, otherwise "f32"."""
     return "bf16" if "BF16" in _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES") else "f32"
 
 
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
-    """Load a .tflite file as a function from an image to named outputs, which uses one thread.
+    """Load a .tflite file as a single-threaded function from an image to named outputs.
 
     Args:
         path: path of the file.

@@ -1,8 +1,8 @@
-"""Weights of the pose networks, which are fetched when needed and stored in the user's cache.
+"""Weights of the pose networks, which are downloaded on demand and stored in the user's cache.
 
-They are Google's BlazePose (Apache-2.0), and every process verifies their checksums. The detector
-and `full` are part of the official `mediapipe` wheel, which is never installed; `lite` and `heavy`
-are part of Google's package on npm.
+The weights are those of Google's BlazePose (Apache-2.0). Every process verifies their checksums.
+The detector and `full` are part of the official `mediapipe` wheel, which is never installed; `lite`
+and `heavy` are part of Google's package on npm.
 """
 
 import functools
@@ -23,9 +23,9 @@ from hrc_env.perception.downloads import download_file, download_wheel, read_mem
 log = logging.getLogger("hrc_env.weights")
 
 WHEEL = "mediapipe==0.10.21"
-"""Requirement of the last release of mediapipe that contains the detector and `full`."""
+"""Requirement specifier of the last release of mediapipe with the detector and `full`."""
 WHEEL_BYTES = 35_622_638.0
-"""Size of the wheel of mediapipe [bytes]."""
+"""Size of the mediapipe wheel [bytes]."""
 TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
 """Address of the npm package `@mediapipe/pose`, which contains all landmark networks."""
 SETUP = "python -m hrc_env setup"
@@ -37,9 +37,9 @@ class WeightsFile:
     """An official file of weights in an archive."""
 
     archive: str
-    """Requirement (wheel) or address (tarball) of the archive."""
+    """Requirement specifier of the wheel, or address of the tarball, that contains the file."""
     member: str
-    """Path of the file in the archive."""
+    """Path of the file within the archive."""
     size_bytes: int
     """Size of the file [bytes]."""
     sha256: str
@@ -78,7 +78,7 @@ ALWAYS = ("pose_detection", "pose_landmark_full")
 
 
 def setup_command(names: Iterable[str]) -> str:
-    """Return the command that fetches these weights."""
+    """Return the command that downloads the named weights."""
     extra = [name.removeprefix("pose_landmark_") for name in names if name not in ALWAYS]
     return " ".join([SETUP, *(["--networks", *extra] if extra else [])])
 
@@ -112,7 +112,7 @@ def find_weights(name: str) -> Path:
 
 
 def _path_of(name: str) -> Path:
-    """Return the path of a weights file, which may be in a read-only cache."""
+    """Return the path at which a weights file is stored, which may be in a read-only cache."""
     usual, file = folders.usual_cache(), f"{name}.tflite"
     if not os.environ.get("HRC_ENV_CACHE") and usual is not None and (usual / file).is_file():
         return usual / file
@@ -153,7 +153,7 @@ def _found(name: str) -> Path | None:
 
 
 def _fetch(archive: str, names: list[str], folder: Path) -> None:
-    """Download an archive and unpack the weights with these names into a folder."""
+    """Download an archive, and unpack the named weights into a folder."""
     is_wheel, again = archive == WHEEL, setup_command(names)
     size = f", {WHEEL_BYTES / 1e6:.0f} MB" if is_wheel else ""
     name = archive if is_wheel else archive.rsplit("/", 1)[-1]
@@ -182,7 +182,7 @@ def _fetch(archive: str, names: list[str], folder: Path) -> None:
 
 @functools.cache
 def _verify(name: str, path: Path, _mtime_ns: int, _size: int) -> None:
-    """Raise `WeightsError` unless a file is the official one; success is cached."""
+    """Raise `WeightsError` unless a file is the official one; cache successful verifications."""
     _check(name, path.read_bytes(), str(path))
 
 

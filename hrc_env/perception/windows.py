@@ -1,4 +1,4 @@
-"""Windows of crops around the predicted joints of workers.
+"""Windows around the predicted joints of workers, from which crops are taken.
 
 As in BlazePose's detector stage, a window is centred at mid-hip, as large as the body, and rotated
 so that the torso is upright. The landmark stage tolerates a shift of 0.2 of the side, a scale from
@@ -23,23 +23,24 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import ROI_MARGIN, wrap_angle
 
 MIN_DEPTH_M = 0.5
-"""Minimum depth of a worker's torso in the camera's frame; nearer workers have no window [m]."""
+"""Minimum depth of a worker's torso in the camera's frame [m]. Nearer workers have no window."""
 MIN_JOINTS_INSIDE = 6
 """Minimum number of joints (of 15) inside the image for a worker to have a window."""
 MIN_REACH_M = 0.85
-"""Minimum radius of a window: that of an upright person, because a folded person may stand up
-[m]."""
+"""Minimum radius of a window [m]. It is that of an upright person, because a bent person may stand
+up."""
 MIN_TORSO_M = 0.15
-"""Length of the projected torso below which its direction is undefined, because it is seen end on;
-the window is then upright in the image [m]."""
+"""Length of the projected torso below which the torso is seen end on, with an undefined direction
+[m]. In this case, the window is upright in the image."""
 CROWN = 0.8
-"""Extent of the head and hat beyond the nose, as a share of the distance from the shoulders to the
-nose."""
+"""Extent of the head and hat beyond the nose, as a fraction of the distance from the shoulders to
+the nose."""
 HAND = 0.6
-"""Extent of the hands beyond the wrists, as a share of the distance from elbow to wrist."""
+"""Extent of the hands beyond the wrists, as a fraction of the distance from elbow to wrist."""
 STEADY_SHIFT, STEADY_SCALE, STEADY_TURN_RAD = 0.10, 0.15, 0.2
 """Differences between the predicted and the last window below which the last window is kept: shift
-(share of the side), scale (logarithm) and rotation [rad]; half the landmark stage's tolerances."""
+(as a fraction of the side), scale (logarithm) and rotation [rad]. They are half of the landmark
+stage's tolerances."""
 
 
 class Window(NamedTuple):
@@ -60,7 +61,7 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
         camera: the camera.
 
     Returns:
-        The window in pixels of the image, or None if the worker is behind the camera, very near to
+        The window in pixels of the image, or None if the worker is behind the camera, very close to
         it or outside its image.
     """
     if depth_m[TORSO].min() < MIN_DEPTH_M:
@@ -116,9 +117,9 @@ def _squared_norm(x: float, y: float) -> float:
 
 
 def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
-    """Return the last window if it still fits the predicted one, else the predicted one.
+    """Return the last window if it is close to the predicted one, otherwise the predicted one.
 
-    Unchanged crops give steady landmarks and need not be rendered again.
+    Unchanged crops result in steady landmarks and need not be rendered again.
     """
     if kept is None or wanted is None:
         return wanted

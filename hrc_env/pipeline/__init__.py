@@ -1,1 +1,1 @@
-"""Pipelines of the perception levels: they predict, detect and update the estimates of workers."""
+"""Pipelines of the perception levels, which predict, detect and update estimates of workers."""

@@ -1,7 +1,7 @@
-"""Detection and memory of bystanders, that is, people without a slot.
+"""Detection and memory of bystanders, that is, people that are not assigned to a worker slot.
 
 While all workers are tracked, whole images are searched every `EVERY` steps, and more often while
-there are bystanders. The slots are given to the people nearest to the robot.
+there are bystanders. The slots are assigned to the people nearest to the robot.
 """
 
 import math
@@ -30,51 +30,53 @@ EVERY = 12
 APART_M = 0.35
 """Distance from a tracked worker's hips below which detected hips belong to the worker [m]."""
 ROBOT_M = 0.15
-"""Distance from the axis of a robot's link below which detected hips are not a person's [m]."""
+"""Distance from the axis of a robot's link below which detected hips are attributed to the robot
+instead of a person [m]."""
 TAKEN_M = 0.45
 """Distance from a worker's track below which a confirmed bystander that is not found again is
 considered to be the worker [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
-"""Greatest distance between two sightings of the same person, and its growth per step [m]."""
+"""Maximum distance between two sightings of the same person, and its growth per step [m]."""
 ALONE = 3
 """Number of searches after which a person detected by only one camera is confirmed."""
 MISSES, MISSES_ALONE = 12, 4
-"""Numbers of consecutive searches without a detection after which a person is forgotten: for a
-confirmed person, and for one that is not confirmed."""
+"""Numbers of consecutive searches without a detection after which a confirmed person and an
+unconfirmed person, respectively, are forgotten."""
 HIGHEST_M = 1.6
-"""Greatest height of a person's hips above the floor [m]."""
+"""Maximum height of a person's hips above the floor [m]."""
 BESIDE = 0.4
-"""Distance from the centre of a worker's window, as a share of its side, within which a person
-detected by only one camera may be the worker."""
+"""Distance from the centre of a worker's window, as a fraction of the window's side, within which a
+person detected by only one camera may be the worker."""
 NEARER_M = 0.3
-"""Difference of the distances from the robot above which a nearer person gets a worker's slot
-[m]."""
+"""Difference of the distances from the robot above which a worker's slot is reassigned to a nearer
+person [m]."""
 GIVEN_UP = 6
-"""Number of steps for which the track of a given-up slot is ignored, and the slot's worker is
-searched for; estimators restart after three contradicting steps."""
+"""Number of steps for which the track in a slot that is being reassigned is ignored while a search
+for the nearer person is made. Estimators reinitialize a track after three contradicting steps."""
 HIPS = [JOINT["left_hip"], JOINT["right_hip"]]
 """Indices of the hip joints; their midpoint is the position of a worker's hips."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bystander:
-    """A person without a slot."""
+    """A detected person that is not assigned to a worker slot."""
 
     hips_world: Points3
-    """(3,) midpoint of the hips [m]."""
+    """(3,) midpoint of the hips in the world frame [m]."""
     age: int
-    """Number of steps since the last detection."""
+    """Number of steps since the last detection of the person."""
     n_seen: int
     """Number of searches that detected the person."""
     n_missed: int
-    """Number of consecutive searches without a detection of the person, up to the last one."""
+    """Number of consecutive searches without a detection of the person, up to the most recent
+    search."""
     is_confirmed: bool
-    """Whether several cameras have agreed on the person, or one camera has detected the person
+    """Whether several cameras have agreed on the person, or a single camera has detected the person
     repeatedly."""
 
 
 class Bystanders(Stateful):
-    """The people without one of the W slots, for a batch of environments.
+    """The people that are not assigned to one of the W slots, for a batch of environments.
 
     Args:
         batch: number B of environments.
@@ -90,14 +92,15 @@ class Bystanders(Stateful):
         self.since = np.zeros(batch, int)
         """(B,) number of steps since the last search."""
         self.given_up = np.zeros((batch, n_workers), int)
-        """(B, W) remaining steps for which a slot is given up to a person nearer to the robot."""
+        """(B, W) number of further steps for which a slot is being reassigned to a person nearer to
+        the robot."""
 
     def forget(self, b: int) -> None:
         """Reset environment b."""
         self.people[b], self.since[b], self.given_up[b] = [], 0, 0
 
     def others(self, ids: Ints, dt_s: float) -> Others:
-        """Return the confirmed bystanders of environments `ids`; a step lasts `dt_s` [s]."""
+        """Return the confirmed bystanders of environments `ids`; a step lasts for `dt_s` [s]."""
         others = no_others(len(ids))
         for row, b in enumerate(ids.tolist()):
             confirmed = [person for person in self.people[b] if person.is_confirmed]
@@ -145,9 +148,9 @@ class Bystanders(Stateful):
         hips_world: Points3,
         robot_world: Capsules | None,
     ) -> list[Sighting]:
-        """Update the bystanders with the result of a search, and return the people found.
+        """Update the bystanders with the result of a search, and return the sightings.
 
-        The returned sightings exclude the workers.
+        Sightings of workers are not returned.
 
         Args:
             b: index of the environment.
@@ -199,7 +202,7 @@ class Bystanders(Stateful):
         return robot_world is not None and _away_m(one.hips_world, robot_world) < ROBOT_M
 
     def _hand_over(self, b: int, hips_world: Points3, robot_world: Capsules) -> None:
-        """Give up the slot of the worker farthest from the robot if a bystander is nearer."""
+        """Reassign the slot of the worker farthest from the robot if a bystander is nearer."""
         near = [
             _away_m(person.hips_world, robot_world)
             for person in self.people[b]
@@ -211,7 +214,7 @@ class Bystanders(Stateful):
 
 
 def _exclude_workers(found: Candidates, taken: Windows) -> Candidates:
-    """Return the people (C,) that are not workers, with one detection per person and camera."""
+    """Return the people (C,) other than workers, with one detection per person and camera."""
     beside = [list(windows) for windows in found]
     for c, windows in enumerate(beside):
         for mine in (each[c] for each in taken):
@@ -229,7 +232,8 @@ def _update_person(
 
     Args:
         person: the bystander before the search.
-        left: sightings that are not assigned to a person yet; the person's sighting is removed.
+        left: sightings that are not yet assigned to a person; the sighting of this person is
+            removed.
         hips_world: (W, 3) hips of the workers [m]; NaN for workers without a track.
     """
     off_m = [math.dist(person.hips_world[:2], one.hips_world[:2]) for one in left]
@@ -245,7 +249,7 @@ def _update_person(
 
 
 def _away_m(hips_world: Points3, robot_world: Capsules) -> float:
-    """Return the distance of hips (3,) from the nearest of the axes of capsules (K, 2, 3) [m]."""
+    """Return the distance of hips (3,) from the nearest axis of the capsules (K, 2, 3) [m]."""
     point = np.broadcast_to(hips_world, (1, 1, 1, 2, 3))
     capsules, radius = robot_world[None], np.zeros(len(robot_world))
     return float(least_separation(capsules, radius, point, np.zeros(1)).distance_m[0, 0])

@@ -1,4 +1,4 @@
-"""Level `keypoints`: the true joints, projected into the images, with the detector's errors."""
+"""Perception level `keypoints`: projections of the true joints with the detector's errors."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -30,11 +30,11 @@ class _Exposure(NamedTuple):
     expected: PoseEstimate
     """Prediction of the tracker for this step."""
     dim: Quality | None
-    """(B, C) quality of the images; None in usual light."""
+    """(B, C) quality of the images; None in normal light."""
 
 
 class EmulatedCameras(TrueState):
-    """An emulator of cameras and detector, which computes keypoints from the true poses.
+    """An emulator of cameras and detector that computes keypoints from the true poses.
 
     Args:
         scene: the scene with the rig's cameras.
@@ -50,15 +50,16 @@ class EmulatedCameras(TrueState):
         self.history = None if schedule.is_plain else History(batch, schedule)
         self.appearance, self.schedule = config.appearance, schedule
         self.light = np.ones(batch)
-        """(B,) strength of the light in each environment's episode, relative to the default."""
+        """(B,) light intensity in the present episode of each environment, relative to the
+        default."""
         self.blank = np.zeros((batch, len(scene.cameras)), np.bool_)
-        """(B, C) whether a camera's present image is blank."""
+        """(B, C) mask of the cameras with a blank present image."""
         self.emulator = emulator.make_state(
             batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Delete the images of environments `ids` and draw new faults, light and lasting errors."""
+        """Delete the images of environments `ids`; sample new faults, light and lasting errors."""
         if self.history is not None:
             self.history.reset(ids, rngs)
         if self.appearance != AS_BUILT:
@@ -109,7 +110,7 @@ class EmulatedCameras(TrueState):
         return emulator.shuffle_workers(keypoints, rngs)
 
     def _picture_quality(self, ids: Ints) -> Quality | None:
-        """Return the quality (B, C) of the images taken now, or None in usual light."""
+        """Return the quality (B, C) of the images taken now, or None in normal light."""
         if self.appearance == AS_BUILT and not any(f.group == IMAGE for f in self.schedule.faults):
             return None
         steps = np.zeros(len(ids), int) if self.history is None else self.history.steps[ids] + 1
@@ -129,7 +130,7 @@ class EmulatedCameras(TrueState):
     def _emulate_frames(
         self, exposure: _Exposure, state: EmulatorState, rngs: Generators, history: History
     ) -> Keypoints:
-        """Return the keypoints of the images that have arrived by now.
+        """Return the keypoints of the images that are available at the present step.
 
         A camera may have delivered the present image, an older one, or none.
         """
@@ -159,7 +160,7 @@ class EmulatedCameras(TrueState):
 
 
 class EmulatorPipeline(PoseTracking):
-    """The pipeline of level `keypoints`, which gets keypoints from an emulator of the detector."""
+    """The pipeline of level `keypoints`, which uses an emulator of the detector."""
 
     def __init__(
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
@@ -168,7 +169,7 @@ class EmulatorPipeline(PoseTracking):
         super().__init__(batch, make_setup(scene, config), tracker, self.cameras)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return a mask (B, C) of the cameras with an image that has arrived and is not blank."""
+        """Return a mask (B, C) of the cameras with an available image that is not blank."""
         return super().searched_cameras(ids, age_s) & ~self.cameras.blank[ids]
 
     def schedule_of(self, b: int) -> Schedule:
@@ -177,7 +178,7 @@ class EmulatorPipeline(PoseTracking):
         return self.cameras.schedule if history is None else history.schedule_of(b)
 
     def light_of(self, b: int) -> float:
-        """Return the strength of the light in environment b's episode."""
+        """Return the relative light intensity in environment b's episode."""
         return float(self.cameras.light[b])
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:

@@ -1,8 +1,8 @@
 """Pipelines for single environments with cameras that differ from episode to episode.
 
-A pipeline has one rig, one list of faults and one appearance. An environment gets a separate
-pipeline if its episode has others. Because no result depends on the batch size, that pipeline gives
-exactly the results of a single environment with the same rig, bit for bit.
+A pipeline has one rig, one list of faults and one appearance. An environment is assigned a separate
+pipeline if its episode differs in any of these. Because no result depends on the batch size, that
+pipeline gives exactly the results of a single environment with the same rig, bit for bit.
 """
 
 from collections.abc import Callable
@@ -31,18 +31,18 @@ class CameraSetup:
     """The cameras of one episode."""
 
     rig: tuple[CameraConfig, ...]
-    """Configurations of the cameras, which the estimator knows."""
+    """Configurations of the cameras, which are available to the estimator."""
     faults: tuple[FaultConfig, ...]
-    """Faults of the cameras."""
+    """Faults of the cameras in the episode."""
     appearance: AppearanceConfig
-    """Appearance of the scene."""
+    """Appearance of the scene in the episode."""
 
 
 class MakePipeline(Protocol):
-    """A factory of pipelines for single environments with other cameras."""
+    """A factory of pipelines for single environments with different cameras."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
-        """Return a pipeline with these cameras that borrows the renderer and networks of `like`."""
+        """Return a pipeline with the cameras of `setup` and the renderer and networks of `like`."""
         ...
 
 
@@ -81,29 +81,29 @@ class _Own:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Those of the requested environments that share a pipeline."""
+    """The subset of the requested environments that share a pipeline."""
 
     pipeline: PerceptionPipeline
-    """The pipeline of these environments."""
+    """Pipeline that the environments share."""
     rows: Ints
-    """(n,) rows of these environments in the requested batch."""
+    """(n,) rows of the environments in the requested batch."""
     ids: Ints
-    """(n,) indices of these environments in the pipeline."""
+    """(n,) indices of the environments in the pipeline."""
     columns: Ints
     """(C,) indices of the pipeline's cameras in `EpisodicPipeline.names`."""
 
 
 class _PartRecord(NamedTuple, Generic[RecordT]):
-    """A record of the environments that share a pipeline."""
+    """A record of the environments in `part`."""
 
     part: _Part
     """The environments and their pipeline."""
     record: RecordT
-    """(n, ...) record of these environments."""
+    """(n, ...) record of the environments in `part`."""
 
 
 class _Place(NamedTuple):
-    """The pipeline of an environment and its index there."""
+    """The pipeline of an environment, and the environment's index in it."""
 
     pipeline: PerceptionPipeline
     """Pipeline of the environment."""
@@ -112,7 +112,7 @@ class _Place(NamedTuple):
 
 
 class EpisodicPipeline(PerceptionPipeline):
-    """A shared pipeline for most environments and a separate one for each with other cameras.
+    """A pipeline with separate sub-pipelines for environments with different cameras.
 
     Args:
         shared: the pipeline that most environments share.
@@ -128,7 +128,7 @@ class EpisodicPipeline(PerceptionPipeline):
         self._own: dict[int, _Own] = {}
 
     def assign(self, b: int, setup: CameraSetup | None) -> None:
-        """Set the cameras of environment `b` for its next episode; None means the shared ones."""
+        """Set the cameras of environment `b` for its next episode; None selects the shared ones."""
         had = self._own.get(b)
         if had is not None and had.setup == setup:
             return
@@ -139,7 +139,7 @@ class EpisodicPipeline(PerceptionPipeline):
             self._own[b] = _Own(setup, self._make(setup, self.shared))
 
     def setup_of(self, b: int) -> CameraSetup | None:
-        """Return the cameras of environment `b`, or None if it has the shared ones."""
+        """Return the cameras of environment `b`, or None if it uses the shared ones."""
         return self._own[b].setup if b in self._own else None
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
@@ -155,7 +155,7 @@ class EpisodicPipeline(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the belief about environments `ids` after the sensors' measurements."""
+        """Return the belief about workers in environments `ids`, updated by the measurements."""
 
         def perceive(part: _Part) -> PoseEstimate:
             streams = ([rngs[row] for row in part.rows] for rngs in (sensor_rngs, tracker_rngs))
@@ -171,7 +171,7 @@ class EpisodicPipeline(PerceptionPipeline):
         )
 
     def last_detections(self, b: int) -> Detections:
-        """Return the last keypoints of environment `b` and their windows."""
+        """Return the last keypoints of environment `b`, and the windows of their detection."""
         pipeline, b = self._place(b)
         return pipeline.last_detections(b)
 
@@ -179,8 +179,8 @@ class EpisodicPipeline(PerceptionPipeline):
     def measurements(self) -> Keypoints:
         """Last keypoints (B, C, W, J) that the estimators received.
 
-        The cameras are in the order of `names`. A camera that is not in an episode's rig has no
-        keypoints and no time.
+        The cameras are in the order of `names`. The keypoints and times of cameras that are not in
+        an episode's rig are missing.
         """
         shared = self.shared.measurements
         whole = replace(map_arrays(shared, np.copy), time_s=self._times_s(self.shared, shared))
@@ -198,7 +198,7 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.crops(b)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
+        """Return the appearance of environment `b`'s episode, or None for the default one."""
         pipeline, b = self._place(b)
         return pipeline.look_of(b)
 
@@ -208,14 +208,14 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.schedule_of(b)
 
     def light_of(self, b: int) -> float:
-        """Return the strength of the light in environment `b`'s episode."""
+        """Return the relative light intensity in environment `b`'s episode."""
         pipeline, b = self._place(b)
         return pipeline.light_of(b)
 
     def suspected_cameras(self, ids: Ints) -> Bools:
         """Return a mask (B, C) of possibly miscalibrated cameras, in the order of `names`.
 
-        It is False for cameras that are not in an episode's rig.
+        The mask is False for cameras that are not in an episode's rig.
         """
         found = np.zeros((len(ids), len(self.names)), np.bool_)
         for part in self._parts(ids):
@@ -225,7 +225,7 @@ class EpisodicPipeline(PerceptionPipeline):
     def vacancy(self, ids: Ints) -> Vacancy | None:
         """Return the state of the floor of environments `ids`, or None if there are no cameras.
 
-        If the environments have several rigs, every patch of floor forms a separate group.
+        If the environments have different rigs, every patch of floor forms a separate group.
         """
         parts = self._parts(ids)
         found = [_PartRecord(part, part.pipeline.vacancy(part.ids)) for part in parts]
@@ -254,12 +254,12 @@ class EpisodicPipeline(PerceptionPipeline):
         self.shared.close()
 
     def get_state(self) -> EpisodicState:
-        """Return a copy of the changing state, including the cameras of single environments."""
+        """Return a copy of the state, including the cameras of separate pipelines."""
         own = {b: each.get_state() for b, each in self._own.items()}
         return EpisodicState(self.shared.get_state(), own)
 
     def set_state(self, state: Any) -> None:
-        """Restore a state, which may be one of a pipeline that all environments shared."""
+        """Restore a state, which may also be that of a pipeline shared by all environments."""
         if not isinstance(state, EpisodicState):
             state = EpisodicState(state, {})
         self.shared.set_state(state.shared)
@@ -280,7 +280,7 @@ class EpisodicPipeline(PerceptionPipeline):
             self._own[b].pipeline.set_state(state)
 
     def _place(self, b: int) -> _Place:
-        """Return the pipeline of environment `b` and its index there."""
+        """Return the pipeline of environment `b`, and the environment's index in it."""
         return _Place(self._own[b].pipeline, 0) if b in self._own else _Place(self.shared, b)
 
     def _parts(self, ids: Ints) -> list[_Part]:
@@ -300,22 +300,22 @@ class EpisodicPipeline(PerceptionPipeline):
 
     @staticmethod
     def _times_s(pipeline: PerceptionPipeline, seen: Keypoints) -> Floats:
-        """Return the times (B, C) of frames [s]; pipelines without times have current frames."""
+        """Return the times (B, C) of frames [s]; frames without timestamps are current."""
         if seen.time_s is not None:
             return seen.time_s.copy()
         return np.repeat(pipeline.now_s[:, None], seen.px.shape[1], axis=1)
 
     def _gather(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
-        """Apply a function to each part and join the results to one estimate (B, W, ...)."""
+        """Apply a function to each part, and join the results in one estimate (B, W, ...)."""
         return _join(len(ids), [_PartRecord(part, find(part)) for part in self._parts(ids)])
 
 
 class EpisodicSensor(Sensor):
-    """The sensors of an `EpisodicPipeline`; each receives the environments of its pipeline.
+    """The sensors of an `EpisodicPipeline`, each of which observes its pipeline's environments.
 
     Args:
         needs_truth: whether the sensors require a `TrueSensorInput`.
-        parts: function that groups environments by pipeline.
+        parts: function that groups the environments by their pipeline.
     """
 
     def __init__(self, needs_truth: bool, parts: Callable[[Ints], list[_Part]]) -> None:

@@ -1,4 +1,4 @@
-"""Tracking of people in images, by the pose network on crops around them."""
+"""Tracking of people in images by the pose network, which is applied to crops around them."""
 
 from dataclasses import replace
 
@@ -20,9 +20,9 @@ class ImageSensor(Sensor):
     """A sensor that consists of cameras with images."""
 
     images: ImageSource
-    """Present images of the environment for which `show` was called last."""
+    """Present images of the environment that was selected by the last call of `show`."""
     has_times = True
-    """Whether images may be delayed and carry the times at which they were taken."""
+    """Whether images may be delayed and have timestamps."""
 
     def show(self, b: int) -> Floats:
         """Set `images` to the present images of environment b.
@@ -34,9 +34,9 @@ class ImageSensor(Sensor):
         raise NotImplementedError
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return a mask (B, C) of cameras with repeating images, which do not prove absence.
+        """Return a mask (B, C) of the cameras that repeat their images.
 
-        The base class returns False, (B, 1).
+        Repeated images do not prove the absence of people. The base class returns False, (B, 1).
         """
         return np.zeros((len(ids), 1), np.bool_)
 
@@ -85,7 +85,7 @@ class ImageTracking(PoseTracking):
         return replace(seen, time_s=time_s if sensor.has_times else None)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return a mask (B, C) of the cameras that have searched a whole image for people."""
+        """Return a mask (B, C) of the cameras with a whole image that was searched for people."""
         return self.worker_detector.searched_cameras(ids) & ~self.image_sensor.stuck_cameras(ids)
 
     def cameras_with_others(self, ids: Ints) -> Bools:
@@ -93,11 +93,11 @@ class ImageTracking(PoseTracking):
         return self.worker_detector.unexplained[ids]
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction without the tracks that lose their slots to nearer people."""
+        """Return a prediction without tracks in slots that are reassigned to nearer people."""
         return self.worker_detector.drop_given_up(ids, expected)
 
     def others(self, ids: Ints) -> Others:
-        """Return the people without a slot."""
+        """Return the people that are not assigned to a slot."""
         return self.worker_detector.bystanders.others(ids, self.setup.dt_s)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
@@ -107,7 +107,7 @@ class ImageTracking(PoseTracking):
             self.worker_detector.forget(int(b))
 
     def last_detections(self, b: int) -> Detections:
-        """Return the last keypoints of environment `b` and their windows."""
+        """Return the last keypoints of environment `b`, and the windows of their detection."""
         return Detections(super().last_detections(b).keypoints, self.worker_detector.windows[b])
 
     def crops(self, b: int) -> list[Image | None]:

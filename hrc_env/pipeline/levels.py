@@ -1,4 +1,4 @@
-"""Perception levels: pipelines with one interface, from sensors to a belief about the workers.
+"""Perception levels: pipelines with a common interface that estimate the workers from sensors.
 
 | level | input of the estimator |
 |---|---|
@@ -37,9 +37,9 @@ from hrc_env.tracking.forecast import forecast
 LEVELS = ("pixels", "keypoints", "truth", "none")
 """Names of the perception levels."""
 CAMERA_LEVELS = LEVELS[:2]
-"""Levels that have cameras."""
+"""Perception levels with cameras."""
 EMULATED = ("darkness",)
-"""Kinds of image faults that level `keypoints` emulates."""
+"""Kinds of image faults that are emulated at level `keypoints`."""
 
 
 def prepare(level: str, detector: DetectorConfig) -> None:
@@ -71,8 +71,8 @@ def make_pipeline(
         batch: number of environments.
         config: settings of the environment.
         shows_images: whether observations contain images.
-        like: a pipeline of the same level and scene with other cameras that lends its renderer
-            and networks, or None.
+        like: a pipeline of the same level and scene with other cameras, with a renderer and
+            networks to be shared; None to create new ones.
 
     Raises:
         ConfigError: the level is unknown or does not support the settings.
@@ -100,7 +100,7 @@ def make_pipeline(
 
 @dataclass(frozen=True, slots=True)
 class PipelineOfEpisode:
-    """A factory of pipelines for single environments with other cameras in their episodes."""
+    """A factory of pipelines for single environments with different cameras in their episodes."""
 
     level: str
     """Perception level."""
@@ -114,7 +114,7 @@ class PipelineOfEpisode:
     """Whether observations contain images."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
-        """Return a pipeline with these cameras that borrows the renderer and networks of `like`."""
+        """Return a pipeline with the cameras of `setup` and the renderer and networks of `like`."""
         scene = with_rig(self.scene, setup.rig)
         config = replace(self.config, faults=setup.faults, appearance=setup.appearance)
         return make_pipeline(self.level, self.estimator, scene, 1, config, self.shows_images, like)
@@ -139,10 +139,11 @@ def check_supported(
         level: the perception level.
         appearance: the appearance of the scene.
         faults: the faults of the cameras.
-        shows_images: whether observations contain images; these support every appearance.
+        shows_images: whether observations contain images, which are supported with every
+            appearance.
 
     Raises:
-        ConfigError: the level does not support one of them.
+        ConfigError: the level does not support the appearance or a fault.
     """
     if not (shows_images or _supports(level, appearance)):
         raise ConfigError(
@@ -166,7 +167,7 @@ def check_supported(
 
 
 class Oracle(PerceptionPipeline):
-    """Level `truth`: the estimate is the truth.
+    """Pipeline of level `truth`, which returns the true states as the estimate.
 
     Args:
         config: settings of the tracker.
@@ -180,7 +181,10 @@ class Oracle(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the truth as an estimate: absent workers get the prior, and no slot is unknown."""
+        """Return the truth as an estimate, with the prior for absent workers.
+
+        No slot is unknown.
+        """
         known = require_truth(self.sensor.now)
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
@@ -195,7 +199,7 @@ class Oracle(PerceptionPipeline):
 
 
 class NoPerception(PerceptionPipeline):
-    """Level `none`: the estimate is the prior, and every slot is unknown.
+    """Pipeline of level `none`, which returns the prior as the estimate, with all slots unknown.
 
     Args:
         prior: (B, W, ...) prior of the workers.

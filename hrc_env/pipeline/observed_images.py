@@ -1,4 +1,4 @@
-"""Images of the rig's cameras, rendered for the observations of policies."""
+"""Images of the rig's cameras that are rendered for observations."""
 
 from collections.abc import Sequence
 
@@ -20,16 +20,16 @@ from hrc_env.scene.camera_images import SMOOTHING, CameraImages, ImageConfig
 from hrc_env.scene.domain_randomization import Look
 
 Images = dict[str, NDArray[np.uint8]]
-"""Images (B, H, W, 3) by name."""
+"""Images (B, H, W, 3) by name of the image in the observation."""
 
 
 class ObservedImages:
-    """A renderer of images for observations, which depend only on the scene and its appearance.
+    """A renderer of images for observations, based only on the scene, its appearance and the rig.
 
     Args:
         scene: the scene with the rig's cameras.
         config: settings of the images.
-        bends: whether cameras of an episode may have lenses although those of the scene have none.
+        bends: whether cameras of an episode may have lenses even if those of the scene have none.
 
     Raises:
         ConfigError: a chosen camera is not in the rig or is chosen twice.
@@ -56,11 +56,11 @@ class ObservedImages:
         looks: Sequence[Look | None],
         rigs: Sequence[Sequence[PinholeCamera]],
     ) -> Images:
-        """Return the images (B, H, W, 3) of environments by name.
+        """Return the images (B, H, W, 3) of environments, by name.
 
         Args:
-            now: the scene of each environment, row by row.
-            looks: (B,) appearance of each environment; None for the scene as built.
+            now: the scene, with one row per environment.
+            looks: (B,) appearance of each environment; None for the default appearance.
             rigs: (B,) cameras of each episode; images of all other cameras are black.
         """
         images = {name: np.zeros((len(now.ids), *self.shape), np.uint8) for name in self.names}
@@ -99,7 +99,7 @@ class ObservedImages:
 def _select_cameras(
     rig: tuple[PinholeCamera, ...], choices: Sequence[int | str] | None
 ) -> tuple[PinholeCamera, ...]:
-    """Return the cameras of a rig with these names or indices, or all if `choices` is None."""
+    """Return the cameras of a rig with the given names or indices; for None, all cameras."""
     names = [camera.name for camera in rig]
     chosen: list[int] = []
     for choice in range(len(rig)) if choices is None else choices:
@@ -119,14 +119,14 @@ def _select_cameras(
 
 
 def _square_px(camera: PinholeCamera, config: ImageConfig) -> int:
-    """Return the side of the full-resolution square from which a lens's image is cropped [px]."""
+    """Return the side of the full-resolution square from which an image is cropped [px]."""
     side_px = max(camera.width_px, camera.height_px)
     shares = config.width / camera.width_px, config.height / camera.height_px
     return int(np.ceil(SMOOTHING * side_px * max(shares)))
 
 
 def _shrink(square: Image, camera: PinholeCamera, shape: tuple[int, int, int]) -> Image:
-    """Crop a square to the part that a camera's image covers, and shrink it to (H, W, 3)."""
+    """Crop a square to the part that a camera's image covers, and resize it to (H, W, 3)."""
     scale = len(square) / max(camera.width_px, camera.height_px)
     high, wide = round(scale * camera.height_px), round(scale * camera.width_px)
     top, left = (len(square) - high) // 2, (len(square) - wide) // 2

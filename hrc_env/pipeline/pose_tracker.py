@@ -37,16 +37,16 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 
 MOST_WORKERS = 16
-"""Greatest number of people that one tracker can track."""
+"""Maximum number of people that one tracker can track."""
 MOST_SUMS = 1000
-"""Number of stored checksums of crops above which all are deleted, because windows move with
-people."""
+"""Maximum number of stored checksums of crops. Because windows move with people, checksums
+accumulate; if there are more, all are deleted."""
 _ALONE = np.arange(1)
-"""Indices of a batch of one environment."""
+"""Indices of the environments in a batch of one."""
 
 
 class _Films(ImageSensor):
-    """The images that a caller passes; a camera is stuck if its images repeat bit for bit.
+    """A sensor with images passed by the caller, which detects cameras that repeat their images.
 
     Args:
         n_cameras: number C of cameras.
@@ -64,7 +64,7 @@ class _Films(ImageSensor):
         self.sums: dict[tuple[int, Roi], int] = {}
         """Checksum of the last crop of each camera and window."""
         self.repeats: dict[int, bool] = {}
-        """Whether all crops from windows that were used before are unchanged, by camera."""
+        """Whether all crops from previously used windows are unchanged, by camera."""
 
     def take(self, source: ImageSource, robot_world: Capsules | None) -> None:
         """Set the present images and the robot's capsules."""
@@ -73,11 +73,11 @@ class _Films(ImageSensor):
             self.sums.clear()
 
     def show(self, b: int) -> Floats:
-        """Return the times (C,) of the images [s], which are zero, because all are current."""
+        """Return the timestamps (C,) of the images [s]: zero, because all images are current."""
         return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window (256, 256, 3) of a camera's image, and check if the crop has changed."""
+        """Return a window (256, 256, 3) of a camera's image, and record whether it has changed."""
         crop = crop_image(require(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
@@ -87,7 +87,7 @@ class _Films(ImageSensor):
         return crop
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return a mask (1, C) of the cameras with only unchanged crops."""
+        """Return a mask (1, C) of the cameras for which all crops are unchanged."""
         return np.array([[self.repeats.get(c, False) for c in range(self.n_cameras)]])
 
     def robots_world(self) -> Capsules | None:
@@ -96,21 +96,21 @@ class _Films(ImageSensor):
 
 
 class PoseTracker:
-    """A tracker of people in the images of a rig, which works like level `pixels` of environments.
+    """A tracker of people in the images of a rig, with the methods of perception level `pixels`.
 
-    It needs no simulator.
+    It does not need a simulator.
 
     Args:
-        cameras: the rig: either `CameraConfig`s, as `read_rig` returns them, of which only the
-            pose, the image and the lens are used; or the result of `make_cameras`.
-        n_workers: greatest number of tracked people.
-        dt_s: usual time between two sets of frames [s].
+        cameras: the rig: either `CameraConfig`s, such as those from `read_rig`, of which only pose,
+            image size, intrinsics and lens are used; or the result of `make_cameras`.
+        n_workers: maximum number of tracked people.
+        dt_s: default time between two sets of frames [s].
         estimator: the estimator, as in `EnvConfig`.
         tracker: settings of the tracker; None for the defaults.
         detector: settings of the detector; None for the defaults.
-        floor_world: (N, 3) points of the floor where people may be, about 0.25 m apart [m]; people
-            are considered absent once the cameras have seen all of it empty. None for the floor
-            in the common view of the cameras.
+        floor_world: (N, 3) points of the floor where people may be, about 0.25 m apart [m]. People
+            are considered absent once the cameras have observed all of these points to be empty.
+            None for the floor in the common view of the cameras.
 
     Raises:
         ConfigError: an argument is invalid.
@@ -164,11 +164,11 @@ class PoseTracker:
             source: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, or an `ImageSource`
                 that returns windows of them. A camera is considered stuck if its images repeat bit
                 for bit; it then does not prove that people are absent.
-            dt_s: time since the last frames [s]; None for the usual time.
+            dt_s: time since the last frames [s]; None for the default time.
             rngs: one random generator, for stochastic estimators; if empty, one with seed 0.
-            robot_world: (K, 2, 3) the robot's capsules [m]. If there are more people than
-                `n_workers`, those nearest to the robot are tracked; if None, those that were
-                tracked first.
+            robot_world: (K, 2, 3) capsules of the robot [m]. If there are more people than
+                `n_workers`, those nearest to the robot are tracked. If it is None, people that are
+                already tracked have priority.
 
         Returns:
             Belief about the workers (1, W, J, ...), in the frame of the cameras' poses.
@@ -188,11 +188,11 @@ class PoseTracker:
 
     @property
     def more_people(self) -> bool:
-        """Whether cameras detect more people than `n_workers`; all slots are then `unknown`."""
+        """Whether cameras detect more people than `n_workers`; if so, all slots are `unknown`."""
         return bool(self._tracking.vacancy(_ALONE).others.any[0])
 
     def forget(self) -> None:
-        """Delete all tracks; the tracker is then in its initial state."""
+        """Delete all tracks, and return to the initial state."""
         rngs = [np.random.default_rng(0)]
         self._tracking.reset(_ALONE, rngs, rngs)
 

@@ -1,8 +1,8 @@
-"""Searches of whole images: their schedule, and searches for workers whose track is wrong.
+"""Searches of whole images: their schedule, and searches for workers with a wrong track.
 
 A camera without people in its image is not searched again for some steps. If fewer than two cameras
-have detected a tracked worker for some steps, the images of the others are searched; if these agree
-on a person, windows around that person are used until the estimator follows.
+have detected a tracked worker for some steps, the images of the other cameras are searched. If
+these agree on a person, windows around that person are used until the track has moved there.
 """
 
 from collections.abc import Collection, Sequence
@@ -22,10 +22,10 @@ PATIENCE = 8
 """Number of consecutive steps without a detection of a worker after which a camera's whole image
 is searched."""
 FOLLOWED = 5
-"""Number of steps for which a window from a search is used; estimators restart after three
-contradicting steps."""
+"""Number of steps for which a window from a search is used. Estimators reinitialize a track after
+three contradicting steps."""
 ENOUGH = 2
-"""Number of cameras that must detect a worker so that the track needs no search."""
+"""Number of cameras that must detect a tracked worker to make a search unnecessary."""
 
 
 class SearchSchedule(Stateful):
@@ -42,13 +42,13 @@ class SearchSchedule(Stateful):
     def __init__(self, batch: int, n_cameras: int, every: int) -> None:
         self.every = every
         self.rests = np.zeros((batch, n_cameras), int)
-        """(B, C) number of further steps for which a camera is not searched."""
+        """(B, C) number of further steps for which a camera's image is not searched."""
         self.ages = np.full((batch, n_cameras), REMEMBERED)
-        """(B, C) number of steps since a camera was searched, up to `REMEMBERED`."""
+        """(B, C) number of steps since a camera's image was searched, up to `REMEMBERED`."""
         self.people: list[list[list[Roi]]] = [[[] for _ in range(n_cameras)] for _ in range(batch)]
-        """(B, C) people that each camera's last search found."""
+        """(B, C) windows of the people found by each camera's last search."""
         self.blank = np.zeros((batch, n_cameras), np.bool_)
-        """(B, C) whether the image of each camera's last search was blank."""
+        """(B, C) mask of the cameras with a blank image in their last search."""
 
     def reset(self, b: int) -> None:
         """Reset environment b."""
@@ -61,7 +61,7 @@ class SearchSchedule(Stateful):
         self.ages[b] = np.minimum(self.ages[b] + 1, REMEMBERED)
 
     def due_cameras(self, b: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the indices of the cameras with images that are to be searched now."""
+        """Return the indices of the cameras with images that are due to be searched."""
         return np.flatnonzero(np.array(has_image) & (self.rests[b] == 0)).tolist()
 
     def remember(
@@ -76,7 +76,7 @@ class SearchSchedule(Stateful):
             blank: indices of the cameras with a blank image.
 
         Returns:
-            (C,) people found by all recent searches.
+            (C,) windows of the people found by all recent searches.
         """
         for c in cameras:
             self.people[b][c], self.ages[b, c] = list(found[c]), 0
@@ -90,7 +90,7 @@ class SearchSchedule(Stateful):
 
 
 class Reacquisition(Stateful):
-    """Searches for those of W tracked workers of B environments that most cameras do not detect.
+    """Searches for tracked workers that most cameras do not detect.
 
     Args:
         batch: number B of environments.
@@ -112,12 +112,12 @@ class Reacquisition(Stateful):
         """(B, W) number of further steps for which the windows of `elsewhere` are used."""
 
     def reset(self, b: int, worker: int) -> None:
-        """Reset a worker of environment b."""
+        """Reset the searches for a worker of environment b."""
         self.unseen[b, worker], self.left[b, worker] = 0, 0
         self.elsewhere[b][worker] = [None] * self.unseen.shape[2]
 
     def blind_cameras(self, b: int, worker: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the indices of the cameras that are to be searched for a tracked worker."""
+        """Return the indices of the cameras with images to be searched for a tracked worker."""
         missing = self.unseen[b, worker] >= PATIENCE
         if self.left[b, worker] or np.sum(~missing) >= min(ENOUGH, len(missing)):
             return []
@@ -126,7 +126,7 @@ class Reacquisition(Stateful):
     def learn(
         self, b: int, worker: int, people: Candidates, windows: Views, others: Windows
     ) -> None:
-        """Use the result of a search for a worker in the images of `blind_cameras`.
+        """Process the result of a search for a worker in the images of `blind_cameras`.
 
         Args:
             b: index of the environment.

@@ -19,13 +19,13 @@ class OpenGL(NamedTuple):
     """The state of OpenGL on a machine."""
 
     is_ready: bool
-    """Whether pictures can be rendered."""
+    """Whether OpenGL can render pictures."""
     message: str
-    """A sentence that describes the state."""
+    """A sentence that describes the state, for users."""
 
 
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:
-    """Fetch the weights and compile the kernels that a perception level needs, if missing.
+    """Download the weights and compile the kernels that a perception level needs, if missing.
 
     Args:
         console: console for messages.
@@ -47,7 +47,7 @@ def make_ready(console: Console, level: str, draws: bool = False, installs: bool
 
 
 def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool = True) -> None:
-    """Fetch the missing weights of the default networks and of further ones.
+    """Download missing weights of the default networks and of further networks.
 
     Args:
         console: console for messages.
@@ -62,11 +62,12 @@ def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool
 
 
 def find_opengl(console: Console, installs: bool = True) -> OpenGL:
-    """Return whether OpenGL can render pictures, and install it if that is allowed.
+    """Return the state of OpenGL, after installing it if necessary and allowed.
 
     Args:
         console: console for messages.
-        installs: whether Debian's OpenGL is installed if none is found and the user is root.
+        installs: whether Debian's OpenGL packages are installed if OpenGL is not found and the user
+            is root.
     """
     from hrc_env.scene import gl
 

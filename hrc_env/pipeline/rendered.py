@@ -1,4 +1,4 @@
-"""Level `pixels`: the pose network on rendered crops."""
+"""Perception level `pixels`: the pose network, applied to rendered crops."""
 
 import numpy as np
 
@@ -21,14 +21,14 @@ from hrc_env.tracking.estimators import Estimator
 
 
 class RenderedCameras(ImageSensor):
-    """Cameras of which only the needed windows are rendered.
+    """Simulated cameras, for which only the requested windows of the images are rendered.
 
     Args:
         scene: the scene with the rig's cameras.
         batch: number of environments.
-        appearance: distribution of the scene's appearance, which is drawn for each episode.
+        appearance: distribution from which the scene's appearance is sampled for each episode.
         schedule: schedule of the cameras' images and faults.
-        renderer: a renderer of the same scene with any cameras; if None, a new one is made.
+        renderer: a renderer of the same scene with any cameras; if None, a new one is created.
     """
 
     CHANGES = ("history", "episode_looks")
@@ -47,10 +47,10 @@ class RenderedCameras(ImageSensor):
         self.images, self.has_times = self.film, not schedule.is_plain
         self.history = History(batch, schedule)
         self.episode_looks: list[Look | None] = [None] * batch
-        """(B,) appearance of each environment's episode; None for the scene as built."""
+        """(B,) appearance of each environment's episode; None for the default appearance."""
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Delete the images of environments `ids`, and draw new faults and a new appearance."""
+        """Delete the images of environments `ids`, and sample new faults and a new appearance."""
         self.history.reset(ids, rngs)
         if self.appearance != AS_BUILT:
             for b in ids:
@@ -63,7 +63,7 @@ class RenderedCameras(ImageSensor):
         return robot_state(chain, q, np.zeros_like(q)).capsules_world
 
     def show(self, b: int) -> Floats:
-        """Set `images` to those that have arrived in environment b, and return their times (C,)."""
+        """Set `images` to those available in environment b, and return their times (C,) [s]."""
         row, history = self.now.ids.tolist().index(b), self.history
         pose = ScenePose(self.now.qpos[row].copy(), copy_arrays(one(self.now.motion, row)))
         step = history.begin_step(b)
@@ -86,8 +86,8 @@ class PixelPipeline(ImageTracking):
         tracker: the estimator.
         config: settings of the environment.
         schedule: schedule of the cameras' images and faults.
-        like: a pipeline of the same scene and detector with other cameras that lends its renderer
-            and networks, or None.
+        like: a pipeline of the same scene and detector with other cameras, with a renderer and
+            networks to be shared; None to create new ones.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class PixelPipeline(ImageTracking):
             detector.pose_detector.borrow_networks(like.worker_detector.pose_detector)
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment b's episode, or None for the scene as built."""
+        """Return the appearance of environment b's episode, or None for the default one."""
         return self.cameras.episode_looks[b]
 
     def schedule_of(self, b: int) -> Schedule:
@@ -124,7 +124,7 @@ class PixelPipeline(ImageTracking):
         return self.cameras.history.schedule_of(b)
 
     def light_of(self, b: int) -> float:
-        """Return the strength of the light in environment b's episode."""
+        """Return the relative light intensity in environment b's episode."""
         look = self.cameras.episode_looks[b]
         return 1.0 if look is None else look.light
 

@@ -1,4 +1,4 @@
-"""The input of sensors; their measurements are all that pipelines know about the world."""
+"""The input of sensors. Pipelines have no other information about the world than measurements."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -18,7 +18,7 @@ Windows: TypeAlias = list[list[Roi | None]]
 
 @dataclass(frozen=True, slots=True)
 class SensorInput:
-    """The scene at the moment of exposure; the rows are the environments `ids`."""
+    """The scene at the moment of exposure, with one row for each of the environments `ids`."""
 
     ids: Ints
     """(B,) index of each row's environment in the batch."""
@@ -31,19 +31,19 @@ class SensorInput:
 
 @dataclass(frozen=True, slots=True)
 class TrueSensorInput(SensorInput):
-    """The scene with the true states of the workers, only for sensors with `NEEDS_TRUTH`."""
+    """The scene with the true states of the workers, for sensors with `NEEDS_TRUTH`."""
 
     truth: WorkerTruth
     """(B, W, ...) true states of the workers."""
     present: Bools
-    """(B, W) whether each worker is in the episode."""
+    """(B, W) mask of the workers that take part in the episode."""
 
 
 class Sensor(Stateful):
-    """The part of a pipeline that receives the scene."""
+    """A sensor, which is the part of a pipeline that has access to the scene."""
 
     NEEDS_TRUTH: bool = False
-    """Whether `expose` takes a `TrueSensorInput`."""
+    """Whether `expose` requires a `TrueSensorInput`."""
     now: SensorInput
     """The scene of the last exposure."""
 
@@ -61,13 +61,13 @@ class Sensor(Stateful):
 
 
 class TrueState(Sensor):
-    """An ideal sensor, which measures the true state."""
+    """An ideal sensor that measures the true state."""
 
     NEEDS_TRUTH = True
 
 
 def require_truth(now: SensorInput) -> TrueSensorInput:
-    """Return an input with the truth, or raise `ConfigError` if it has none."""
+    """Return the input if it contains the truth; otherwise raise `ConfigError`."""
     if not isinstance(now, TrueSensorInput):
         raise ConfigError(f"This sensor needs a TrueSensorInput, got a {type(now).__name__}.")
     return now

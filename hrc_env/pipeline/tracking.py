@@ -1,4 +1,4 @@
-"""The loop that tracks people with cameras: it predicts, detects, updates and judges presence."""
+"""The tracking loop: prediction, detection, update and estimation of presence."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -35,12 +35,13 @@ from hrc_env.tracking.presence import IMAGES, ImageSearches, Presence
 
 
 class Detections(NamedTuple):
-    """The last detections of an environment, for pictures."""
+    """The last detections of an environment, which are used in pictures."""
 
     keypoints: Keypoints | None
-    """(1, C, W, J, ...) keypoints by worker; None if there are no cameras."""
+    """(1, C, W, J, ...) keypoints of the workers; None if there are no cameras."""
     windows: Windows
-    """(W, C) windows in which the keypoints were found; empty if detection uses no windows."""
+    """(W, C) windows in which the keypoints were found; empty if the detector does not use
+    windows."""
 
 
 class PerceptionPipeline(Stateful):
@@ -64,7 +65,7 @@ class PerceptionPipeline(Stateful):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the belief about environments `ids`, updated by the sensor's measurement.
+        """Return the belief about the workers in environments `ids`, updated by the measurement.
 
         Args:
             ids: (B,) indices of environments.
@@ -77,7 +78,7 @@ class PerceptionPipeline(Stateful):
         """Forecast the belief for a future time.
 
         Args:
-            now: (B, W, ...) present belief about environments `ids`.
+            now: (B, W, ...) present belief about the workers in environments `ids`.
             ids: (B,) indices of environments.
             horizon_s: time from now to the forecast [s].
         """
@@ -108,7 +109,7 @@ class PerceptionPipeline(Stateful):
         return []
 
     def look_of(self, b: int) -> Look | None:
-        """Return the appearance of environment `b`'s episode, or None for the scene as built."""
+        """Return the appearance of environment `b`'s episode, or None for the default one."""
         return None
 
     def schedule_of(self, b: int) -> Schedule | None:
@@ -116,7 +117,7 @@ class PerceptionPipeline(Stateful):
         return None
 
     def light_of(self, b: int) -> float:
-        """Return the relative strength of the light in environment `b`'s episode (default 1)."""
+        """Return the light intensity in environment `b`'s episode, relative to the default."""
         return 1.0
 
     def suspected_cameras(self, ids: Ints) -> Bools:
@@ -138,15 +139,15 @@ class TrackingSetup:
     cameras: tuple[PinholeCamera, ...]
     """Cameras of the rig, with their calibrated poses and lenses."""
     n_workers: int
-    """Greatest number W of tracked people."""
+    """Maximum number W of tracked people."""
     coverage: Coverage
-    """Patches of floor, and the cameras that would see a person on each of them."""
+    """Patches of floor, and the cameras in which a person on each patch would be visible."""
     dt_s: float
-    """Usual time between two updates [s]."""
+    """Default time between two updates [s]."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
-    """Settings of the association of poses to workers."""
+    """Settings of the assignment of detected poses to workers."""
     calibration: Calibration = field(default_factory=read_calibration)
-    """Calibration of the errors of the network's joints."""
+    """Calibration of the errors of the joints detected by the network."""
 
 
 def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
@@ -164,7 +165,8 @@ def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
 class PoseTracking(PerceptionPipeline):
     """A pipeline that tracks people with cameras.
 
-    In each step it predicts the workers, detects them, updates the estimator and judges presence.
+    In each step it predicts the workers, detects them, updates the estimator, and estimates which
+    workers are present.
 
     Args:
         batch: number of environments.
@@ -189,7 +191,7 @@ class PoseTracking(PerceptionPipeline):
         self.monitored = make_monitor(batch, n_cameras)
         self.presence = Presence(batch, n_workers, setup.coverage)
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
-        """(C, 3) principal point and focal length [px]."""
+        """(C, 3) principal point (x, y) and focal length of each camera [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Delete the tracks and the images of environments `ids`."""
@@ -203,7 +205,7 @@ class PoseTracking(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Return the belief about environments `ids` after the usual time between updates."""
+        """Return the belief about the workers in environments `ids` after the default time step."""
         return self.track(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
 
     def track(
@@ -248,16 +250,19 @@ class PoseTracking(PerceptionPipeline):
     def cameras_with_others(self, ids: Ints) -> Bools:
         """Return a mask (B, C) of cameras that found people besides workers in the last search.
 
-        The base class returns False, because its keypoints contain all people.
+        The mask of the base class is False, because its keypoints contain all people.
         """
         return np.zeros((len(ids), len(self.setup.cameras)), np.bool_)
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction without the tracks of given-up slots; the base class keeps all."""
+        """Return a prediction without tracks in slots that are being reassigned.
+
+        The base class keeps all tracks.
+        """
         return expected
 
     def others(self, ids: Ints) -> Others:
-        """Return the people without a slot; the base class knows none."""
+        """Return the people that are not assigned to a slot; there are none in the base class."""
         return no_others(len(ids))
 
     def vacancy(self, ids: Ints) -> Vacancy:
@@ -265,7 +270,7 @@ class PoseTracking(PerceptionPipeline):
         return self.presence.vacancy(ids)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return a mask (B, C) of the cameras that have searched a whole image for people.
+        """Return a mask (B, C) of the cameras with a whole image that was searched for people.
 
         Args:
             ids: (B,) indices of environments.
@@ -274,7 +279,7 @@ class PoseTracking(PerceptionPipeline):
         return np.isfinite(age_s)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return the estimator's forecast; the belief about presence stays that of the present."""
+        """Return the estimator's forecast, which retains the present belief about presence."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
@@ -282,7 +287,7 @@ class PoseTracking(PerceptionPipeline):
         return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Detect the keypoints of people in image pixels, without their identities.
+        """Detect the keypoints of people, in image pixels and without association to workers.
 
         Args:
             ids: (B,) indices of environments.
@@ -292,7 +297,7 @@ class PoseTracking(PerceptionPipeline):
         raise NotImplementedError
 
     def _associate(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
-        """Assign keypoints to the workers; a single worker gets all of them."""
+        """Assign keypoints to the workers. If there is one worker, it is assigned all of them."""
         if self.setup.n_workers < 2:
             return keypoints
         return associate(self.P, keypoints, expected, self.setup.association).keypoints
@@ -302,7 +307,7 @@ class PoseTracking(PerceptionPipeline):
         return self.monitored["suspected"][ids] | self.presence.find_contradicting_cameras(ids)
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
-        """Return the ages (B, C) of the images by their timestamps [s]; NaN without an image."""
+        """Return the ages (B, C) of the images from their timestamps [s]; NaN without an image."""
         if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
         return self.steps[ids, None] * self.setup.dt_s - keypoints.time_s
@@ -323,6 +328,6 @@ class PoseTracking(PerceptionPipeline):
 
 
 def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
-    """Return empty keypoints: no camera has detected a joint."""
+    """Return keypoints without any detected joint."""
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))

@@ -1,4 +1,4 @@
-"""Detection of all workers of a scene, in windows at predicted positions and by searches."""
+"""Detection of the workers of a scene, in windows at predicted positions and by searches."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,25 +24,25 @@ class ExpectedPosture(NamedTuple):
     """The posture that a worker is expected to have."""
 
     is_folded: bool
-    """Whether the worker is expected to be folded (`outline.is_folded`)."""
+    """Whether the worker is expected to bend, squat or kneel (`outline.is_folded`)."""
     shares: Sequence[float]
-    """Shares of the postures (`outline.Posture`)."""
+    """Weights of the postures (`outline.Posture`)."""
 
 
 class Crops(NamedTuple):
-    """The last crops of a worker, for pictures."""
+    """The last crops of a worker, which are used in pictures."""
 
     windows: Views
     """(C,) window of each camera."""
     images: list[Image | None]
-    """(C,) crop of each window, as it was given to the network."""
+    """(C,) crop of each window, as it was passed to the network."""
 
 
 class WorkerDetector(Stateful):
     """A detector of the workers of a batch of environments in the images of a rig.
 
-    Tracked workers are detected in windows at their predicted positions, others by searches of
-    whole images.
+    Tracked workers are detected in windows at their predicted positions, and other workers by
+    searches of whole images.
 
     Args:
         batch: number B of environments.
@@ -75,10 +75,11 @@ class WorkerDetector(Stateful):
         self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
         self.bystanders = Bystanders(batch, n_workers, self.cameras)
         self.unexplained = np.zeros((batch, len(self.cameras)), np.bool_)
-        """(B, C) whether a camera's last search found a person that is neither a worker nor one of
-        the `bystanders`."""
+        """(B, C) mask of the cameras in which the last search found a person other than the workers
+        and the `bystanders`."""
         self.last_crops: dict[int, Crops] = {}
-        """Last crops of each environment's first worker, for pictures; not part of the state."""
+        """Last crops of the first worker, by environment, for pictures; they are not part of the
+        state."""
 
     def detect(
         self,
@@ -91,8 +92,8 @@ class WorkerDetector(Stateful):
     ) -> None:
         """Detect every worker of environment b.
 
-        Workers with a window are detected first; one search serves all others. Workers are skipped
-        if only cameras without an image could see them.
+        Workers with a window are detected first; all others are detected by a single search.
+        Workers that are in view only of cameras without an image are skipped.
 
         Args:
             source: the present images.
@@ -100,8 +101,9 @@ class WorkerDetector(Stateful):
             b: index of the environment.
             has_image: (C,) whether each camera has an image now.
             out: (C, W, ...) keypoints, which are filled in.
-            robot_world: (K, 2, 3) the robot's capsules [m]. If there are more people than slots,
-                those nearest to the robot get a slot; if None, those that were tracked first.
+            robot_world: (K, 2, 3) capsules of the robot [m]. If there are more people than slots,
+                those nearest to the robot are assigned to a slot. If it is None, people that are
+                already tracked have priority.
         """
         self.schedule.tick(b)
         self.bystanders.tick(b)
@@ -141,9 +143,9 @@ class WorkerDetector(Stateful):
             self.schedule.rest(b)
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return a prediction of environments `ids` without the tracks of given-up slots.
+        """Return a prediction for environments `ids` without tracks in reassigned slots.
 
-        These slots are given to people nearer to the robot.
+        Slots are reassigned to people that are nearer to the robot.
         """
         given_up = self.bystanders.given_up[ids] > 0
         return (
@@ -151,7 +153,7 @@ class WorkerDetector(Stateful):
         )
 
     def searched_cameras(self, ids: Ints) -> Bools:
-        """Return a mask (B, C) of cameras with images that were just searched and are not blank."""
+        """Return a mask (B, C) of cameras with an image that was just searched and is not blank."""
         return (self.schedule.ages[ids] == 0) & ~self.schedule.blank[ids]
 
     def forget(self, b: int) -> None:
@@ -184,9 +186,9 @@ class WorkerDetector(Stateful):
 
         Args:
             b: index of the environment.
-            beside: sightings of people besides the workers.
-            no_vacancy: whether all slots are tracked; a person is then unexplained only if a single
-                camera has detected it.
+            beside: sightings of people other than the workers.
+            no_vacancy: whether all slots are tracked; in that case, a person is unexplained only if
+                detected by a single camera.
         """
         for c in np.flatnonzero(self.schedule.ages[b] == 0).tolist():
             shown = [one for one in beside if one.windows[c] is not None]
@@ -195,7 +197,7 @@ class WorkerDetector(Stateful):
     def _keep(
         self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints
     ) -> None:
-        """Copy the detection of a worker to keypoints (C, W, ...), and store its windows."""
+        """Copy the detection of a worker to the keypoints (C, W, ...), and store its windows."""
         out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
         out.sigma_px[:, worker] = seen.sigma_px
         for c, has in enumerate(has_image):
@@ -213,7 +215,7 @@ class WorkerDetector(Stateful):
         taken: Windows,
         has_image: Sequence[bool],
     ) -> Views:
-        """Return the windows of a tracked worker, after a search if most cameras miss the worker.
+        """Return the windows of a tracked worker; search for the worker if most cameras miss it.
 
         Args:
             source: the present images.
@@ -235,7 +237,7 @@ class WorkerDetector(Stateful):
         return b * self.n_workers + worker
 
     def _predict_windows(self, expected: PoseEstimate, worker: int) -> Views:
-        """Return a worker's window in each camera (C,), or None without a track or out of view."""
+        """Return a worker's windows (C,), which are None without a track or if out of view."""
         if not expected.tracked[worker]:
             return [None] * len(self.cameras)
         px, depth_m = project(self.P, expected.mean_world[worker : worker + 1])
@@ -243,7 +245,7 @@ class WorkerDetector(Stateful):
 
 
 def _expected_posture(expected: PoseEstimate, worker: int) -> ExpectedPosture:
-    """Return the expected posture of a worker, which is standing if there is no track."""
+    """Return the expected posture of a worker; a worker without a track is expected to stand."""
     if not expected.tracked[worker]:
         return ExpectedPosture(False, STANDING)
     joints = expected.mean_world[worker]

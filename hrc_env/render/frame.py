@@ -17,35 +17,35 @@ WIDTH = 1600
 HEIGHT = 900
 """Height of a frame [px]."""
 ROOM = (792, 716)
-"""Width and height of the picture of the scene [px]."""
+"""Width and height of the picture of the scene in a frame [px]."""
 TILE = (400, 225)
-"""Width and height of a camera's picture [px]."""
+"""Width and height of a camera's picture in a frame [px]."""
 RIGHT_X = WIDTH - 2 * TILE[0] - 4
 """Left edge of the pictures in the right part of a frame [px]."""
 TITLE_Y = 2 * TILE[1] + 22
 """Upper edge of the title in the right part of a frame [px]."""
 CROP = 196
-"""Side of a displayed crop [px]."""
+"""Side of a crop of a camera's image in a frame [px]."""
 BELIEF = (400, 214)
-"""Width and height of a picture of the belief [px]."""
+"""Width and height of a picture of the belief in a frame [px]."""
 LEGEND_HEIGHT = 28
-"""Height of the legend [px]."""
+"""Height of the legend of colours [px]."""
 STRIP_HEIGHT = 180
 """Height of the strip with the curves at the bottom of a frame [px]."""
 STRIP_S = 10.0
-"""Duration that the strip shows [s]."""
+"""Length of the time axis of the strip [s]."""
 FAR_M = 1.5
-"""Greatest distance that the strip shows [m]."""
+"""Maximum of the distance axis of the strip [m]."""
 LEFT, RIGHT, TOP, BOTTOM = 290, WIDTH - 20, 14, STRIP_HEIGHT - 14
-"""Edges of the area of the curves in the strip [px]."""
+"""Left, right, upper and lower edges of the curves' area in the strip [px]."""
 NEAR = (150, 30, 40)
-"""Colour of steps with a cost below 2."""
+"""Colour of steps with a cost above 0 and below 2."""
 TOUCHING = (255, 40, 60)
-"""Colour of steps with a higher cost."""
+"""Colour of steps with a cost of 2 or more."""
 
 
 class Moment:
-    """Values of one step, which the strip shows."""
+    """Values of one step that are plotted in the strip."""
 
     true_m: float
     """True separation [m]."""
@@ -59,7 +59,7 @@ class Moment:
 
 MOMENT = dtype_of(Moment)
 Diary: TypeAlias = Records1[Moment]
-"""(T,) moments of an episode."""
+"""Moments of an episode (T,), one for each step."""
 
 
 def compose(
@@ -97,7 +97,7 @@ def compose(
 
 
 def legend(level: str) -> Image:
-    """Return the legend (28, 792, 3) of the colours at a perception level."""
+    """Return a legend (28, 792, 3) of the colours that are used at a perception level."""
     image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
         ("worker's left", overlay.LEFT, "line"),
@@ -122,7 +122,7 @@ def legend(level: str) -> Image:
 
 
 def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float) -> Image:
-    """Return the strip, which shows true and estimated separation and the cost of recent steps.
+    """Return the strip, a plot of the true and estimated separation and the cost of recent steps.
 
     Args:
         diary: (T,) moments of the episode.
@@ -149,7 +149,7 @@ def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float
 
 
 def _axes(limit_m: float) -> Image:
-    """Return the strip without its curves."""
+    """Return the background and the axes of the strip, without curves."""
     image = _panel(STRIP_HEIGHT, WIDTH)
     for metres in (0.0, 0.5, 1.0, 1.5):
         y = int(_y_of(np.array(metres)))
@@ -165,7 +165,7 @@ def _axes(limit_m: float) -> Image:
 
 
 def _y_of(metres: Floats) -> Floats:
-    """Return the pixel rows of distances in the strip [px]."""
+    """Return the pixel rows of distances [m] in the strip [px]."""
     return np.round(BOTTOM - (BOTTOM - TOP) * np.clip(metres, 0, FAR_M) / FAR_M)
 
 

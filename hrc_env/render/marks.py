@@ -16,7 +16,7 @@ from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 
 OVERLAYS = ("capsules",)
-"""Names of the overlays that pictures of the scene may have."""
+"""Names of the overlays that are available for pictures of the scene."""
 MARKER_M = 0.05
 """Radius of a marker [m]."""
 MARKER_PX = 4
@@ -34,14 +34,14 @@ COLOURS = {
     "people, estimated": overlay.BELIEF,
     "people, true": overlay.RIGHT,
 }
-"""Colours of the capsules by their group."""
+"""Colours of the groups of capsules, by the group's name."""
 LEGEND_FROM_PX = 320
 """Minimum width of pictures with a legend [px]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solids:
-    """Capsules of one group, from which distances are computed."""
+    """Capsules of one group that are used for the computation of distances."""
 
     group: str
     """Name of the group, a key of `COLOURS`."""
@@ -54,9 +54,10 @@ class Solids:
 def find_solids(simulation: Simulation, b: int) -> tuple[Solids, ...]:
     """Return the capsules of robot and people in environment `b`, by group.
 
-    Shields, rewards and the observed separation use the capsules of the robot with its load and of
-    the estimated people; workers without a track have no estimated capsules. Costs, contacts and
-    `info["safety/..."]` use the capsules of the robot and of the true people.
+    Shields, rewards and the observed separation are computed from the capsules of the robot with
+    its load and of the estimated people; workers without a track have no estimated capsules. Costs,
+    contacts and `info["safety/..."]` are computed from the capsules of the robot and of the true
+    people.
     """
     robot, estimate = simulation.belief.robot, one(simulation.estimate, b)
     believed = segments(estimate.mean_world[estimate.tracked])
@@ -98,7 +99,7 @@ def mark_points(points_world: Points3, camera: PinholeCamera) -> Marks:
 
 
 def draw_legend(image: Image, solids: tuple[Solids, ...]) -> None:
-    """Draw a legend with the groups of capsules, in their colours, in a picture."""
+    """Draw a legend of the groups of capsules and their colours in a picture."""
     height, width = image.shape[:2]
     if width < LEGEND_FROM_PX:
         return

@@ -37,15 +37,15 @@ ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
 SHIELD: Colour = (255, 90, 60)
-"""Colour of the shield's frame and label; the constants above are the colours of other drawings."""
+"""Colour of the frame and the label that indicate an active shield."""
 FLOOR_M = 3
-"""Half the side of the grid on the floor [m]."""
+"""Half the side length of the grid on the floor [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
-"""Colours of bones with both ends on the same side of the body; other bones have `MIDDLE`."""
+"""Colours of bones with both ends on the same side of the body; other bones are `MIDDLE`."""
 
 
 class Projection(NamedTuple):
-    """Points in a picture."""
+    """Points that are projected into a picture."""
 
     px: Points2
     """(N, 2) columns and rows [px]."""
@@ -56,10 +56,11 @@ class Projection(NamedTuple):
 def draw_estimate(
     image: Image, camera: PinholeCamera, estimate: PoseEstimate, thickness: int = 2
 ) -> None:
-    """Draw the estimated skeletons of tracked workers, with 2-sigma ellipses.
+    """Draw the estimated skeletons of tracked workers, with 2-sigma ellipses of their joints.
 
     Args:
-        image: (H, W, 3) picture of the camera, of any size with its aspect ratio; it is changed.
+        image: (H, W, 3) picture of the camera, of any size with the aspect ratio of the camera's
+            image; it is changed.
         camera: the camera.
         estimate: estimate of a single environment, as a batch of one.
         thickness: thickness of the lines [px].
@@ -76,7 +77,7 @@ def draw_estimate(
 
 
 def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int) -> None:
-    """Draw the joints that camera `index` detected, fainter where the confidence is lower."""
+    """Draw the joints detected by camera `index`; the opacity increases with the confidence."""
     scale = image.shape[1] / camera.width_px
     px = image_from_pinhole(camera, keypoints.px[0, index].reshape(-1, 2)) * scale
     known = np.isfinite(px).all(-1)
@@ -141,7 +142,7 @@ def draw_path(
 
 
 def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
-    """Draw a ring around each point (M, 3) [m], also where objects occlude the point."""
+    """Draw a ring around each point (M, 3) [m], even if objects occlude the point."""
     px, depth_m = _project(image, camera, markers_world)
     focal_px = camera.K[0, 0] * image.shape[1] / camera.width_px
     for middle, away_m in zip(_fixed(px), depth_m.tolist(), strict=True):
@@ -152,7 +153,7 @@ def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> 
 
 
 def draw_shield(image: Image, change_rad_s: float) -> None:
-    """Draw a frame and a label if the shield's change of the command [rad/s] counts as active."""
+    """Draw a frame and a label if the shield is active, by its change of the command [rad/s]."""
     if change_rad_s > ACTIVE_RAD_S:
         height, width = image.shape[:2]
         thickness = max(2, width // 240)
@@ -164,7 +165,7 @@ def draw_shield(image: Image, change_rad_s: float) -> None:
 
 
 def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Draw a text on a dark background.
+    """Draw text on a dark background.
 
     Args:
         image: the picture, which is changed.
@@ -181,7 +182,7 @@ def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour
 
 
 def write(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
-    """Draw a text in a picture.
+    """Draw text in a picture.
 
     Args:
         image: the picture, which is changed.
@@ -208,7 +209,7 @@ def panel(width: int, height: int) -> Image:
 
 
 def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
-    """Return a picture that shows pictures of equal size in rows, with dark gaps between them."""
+    """Return a mosaic of pictures of equal size, in rows with dark gaps between them."""
     height, width = pictures[0].shape[:2]
     rows = -(-len(pictures) // columns)
     sheet = panel(columns * (width + gap) - gap, rows * (height + gap) - gap)
@@ -219,7 +220,7 @@ def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
 
 
 def shrink(image: NDArray[Any], width: int, height: int) -> Image:
-    """Shrink an image; the new pixels are means of the original ones."""
+    """Reduce the size of an image; each new pixel is the mean of the original ones."""
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
@@ -239,7 +240,7 @@ def _project(image: Image, camera: PinholeCamera, points: Floats) -> Projection:
 def _ellipses(
     image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
-    """Draw the projected 2-sigma regions of joints, to first order.
+    """Draw the 2-sigma ellipses of joints, by linearized projections of their covariances.
 
     Args:
         image: a picture of the camera, which is changed.
@@ -277,7 +278,7 @@ def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
 
 
 def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
-    """Draw joints (N, 2) [px], fainter where the confidence (N,) is lower."""
+    """Draw joints (N, 2) [px], with an opacity that increases with the confidence (N,)."""
     for pixel, share_sure in zip(_fixed(points), confidence.tolist(), strict=True):
         share = 0.35 + 0.65 * share_sure
         colour = [round(p + share * (q - p)) for p, q in zip(PANEL, DETECTED, strict=True)]

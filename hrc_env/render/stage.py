@@ -1,8 +1,9 @@
-"""Fast rendering from fixed viewpoints: moving geoms over a stored picture of the static ones.
+"""Fast rendering from fixed viewpoints, with a cached picture of the static geoms.
 
-Static geoms are rendered once, with their shadows and at a multiple of the picture's size. After
-that, only the part of the picture with the robot and the workers is rendered. Shadows of moving
-geoms are computed from a picture of these geoms from the sun.
+Static geoms are rendered once for each viewpoint, with their shadows and at a multiple of the
+picture's size. For each picture, only the part with the robot and the workers is rendered and laid
+over the static one. Shadows of moving geoms are computed from a depth image of these geoms as seen
+from the sun.
 """
 
 from collections.abc import Hashable
@@ -22,7 +23,7 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, Marks
 
 SMOOTHING = 2
-"""Factor by which the rendering is larger than the picture, for smooth edges."""
+"""Ratio of the size of the rendering to that of the picture, for smooth edges (supersampling)."""
 QUALITY = {
     "offsamples": 0,
     "shadowsize": 4096,
@@ -30,9 +31,9 @@ QUALITY = {
     "numstacks": 5,
     "numquads": 1,
 }
-"""MuJoCo's settings of the visual quality of these pictures."""
+"""Settings of MuJoCo's visual quality for these pictures."""
 SUN_PX = 256
-"""Side of the picture from the sun [px]."""
+"""Side of the depth image as seen from the sun [px]."""
 BIAS_M = 0.03
 """Minimum distance along the light from an object to its shadow [m]."""
 SOFT_PX = 3
@@ -40,16 +41,16 @@ SOFT_PX = 3
 COARSE = 2
 """Spacing of the pixels for which shadows are computed, in both directions [px]."""
 Depths: TypeAlias = NDArray[np.float32]
-"""Depth values or distances of pixels."""
+"""Array of depth values, or of distances or coordinates of pixels."""
 
 
 class Box(NamedTuple):
     """A rectangle in a picture [px]."""
 
     left: int
-    """First column."""
+    """First column of the rectangle."""
     top: int
-    """First row."""
+    """First row of the rectangle."""
     right: int
     """Last column plus one."""
     bottom: int
@@ -62,51 +63,52 @@ class Box(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """A rendered part of the scene, `SMOOTHING` times as large as in the picture, top row first."""
+    """A rendered part of the scene, enlarged by `SMOOTHING`, with the top row first."""
 
     rgb: Image
-    """Colours; black where nothing is rendered."""
+    """Colours of the pixels; black where nothing is rendered."""
     z: Depths
-    """Depths from 1 (near) to 0 (far, or nothing rendered)."""
+    """Depth values of the pixels, from 1 (near) to 0 (far, or nothing rendered)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shade:
-    """A picture of the moving geoms from the sun."""
+    """A depth image of the moving geoms as seen from the sun."""
 
     z: Depths
     """(SUN_PX, SUN_PX) depths: 1 at the near plane, 0 at the far plane and where there is no
     geom."""
     begin_m: float
-    """Coordinate of the near plane along the light [m]."""
+    """Coordinate of the near plane along the direction of the light [m]."""
     deep_m: float
     """Distance of the far plane from the near plane [m]."""
     corner: tuple[float, float]
-    """Coordinates of the first pixel's corner along the right and down axes of `sun_axes` [m]."""
+    """Coordinates of the corner of the first pixel along the axes right and down of `sun_axes`
+    [m]."""
     step_m: float
     """Side length of a pixel [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Backdrop:
-    """A stored picture of the static geoms."""
+    """A cached picture of the static geoms from one viewpoint."""
 
     rgb: Image
-    """Colours, in the picture's size."""
+    """Colours of the picture, at its final size."""
     z: Depths
-    """Depths from 1 (near) to 0 (far), in `SMOOTHING` times the picture's size."""
+    """Depth values from 1 (near) to 0 (far), at `SMOOTHING` times the size of the picture."""
     dark: Image | None
-    """Picture without the sun's light; None for pictures without shadows."""
+    """The same picture without the light of the sun; None for pictures without shadows."""
     spots: tuple[NDArray[np.floating], ...]
-    """Coordinates of the picture's points in the sun's axes (right, down, along the light), (h, w)
-    each [m]."""
+    """Coordinates of the points shown by the pixels, along the sun's axes right, down and along the
+    light; arrays (h, w) [m]."""
 
 
 class Stage(Canvas):
-    """A renderer of pictures from a few viewpoints, which renders static geoms once for each.
+    """A renderer of pictures from a few viewpoints, which renders static geoms once per viewpoint.
 
     Args:
-        scene: the scene.
+        scene: scene that is rendered.
         width: maximum width of a picture [px].
         height: maximum height of a picture [px].
     """
@@ -116,7 +118,7 @@ class Stage(Canvas):
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
         self._shade: Shade | None = None
-        """Picture from the sun in the present pose; None until it is rendered."""
+        """Depth image from the sun for the present pose; None until it is rendered."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Pose the moving geoms.
@@ -129,7 +131,7 @@ class Stage(Canvas):
         self._shade = None
 
     def picture(self, camera: PinholeCamera, shadows: bool = False) -> Image:
-        """Render the picture of a pinhole camera, in the size of the camera's image."""
+        """Render the picture of a pinhole camera, at the size of the camera's image."""
         key = _key(camera, shadows)
         if key not in self._kept:
             self._kept[key] = self._draw_still(camera, shadows)
@@ -173,7 +175,7 @@ class Stage(Canvas):
         part[:] = np.round(part * free[..., None] + laid)
 
     def _backdrop_z(self, camera: PinholeCamera) -> Depths:
-        """Return the depths of the static geoms, `SMOOTHING` times as large as the picture."""
+        """Return the depths of the static geoms, at `SMOOTHING` times the size of the picture."""
         for shadows in (True, False):
             if (key := _key(camera, shadows)) in self._kept:
                 return self._kept[key].z
@@ -185,7 +187,7 @@ class Stage(Canvas):
         return self._read_box(camera, box)
 
     def find_box(self, camera: PinholeCamera) -> Box:
-        """Return a box of the picture that contains all moving geoms."""
+        """Return a bounding box of all moving geoms in the picture."""
         return _bound_spheres(camera, *self.find_moving_spheres())
 
     def draw_shade(self) -> Shade | None:
@@ -208,7 +210,7 @@ class Stage(Canvas):
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
     def _draw_still(self, camera: PinholeCamera, shadows: bool) -> _Backdrop:
-        """Render the backdrop of a camera: a picture of the static geoms."""
+        """Render the backdrop of a camera, that is, a picture of the static geoms."""
         size, axes = (camera.width_px, camera.height_px), self.sun_axes()
         whole = Box(0, 0, *size)
         self.show(STILL, shadows=shadows)
@@ -233,7 +235,7 @@ class Stage(Canvas):
         return Layer(np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1]))
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
-        """Darken a picture in the shadows of moving geoms, as in the backdrop without the sun."""
+        """Darken a picture in the shadows of moving geoms, by the backdrop without the sun."""
         shade = self._shade = self._shade or self.draw_shade()
         if shade is None:
             return
@@ -255,13 +257,13 @@ class Stage(Canvas):
 
 
 def _key(camera: PinholeCamera, shadows: bool) -> tuple[Hashable, ...]:
-    """Return the key under which the backdrop of a camera is stored."""
+    """Return the key under which the backdrop of a camera is cached."""
     view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
     return (*view, camera.width_px, camera.height_px, shadows)
 
 
 def _bound_spheres(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> Box:
-    """Return a box of a camera's picture that contains spheres.
+    """Return a bounding box of spheres in a camera's picture.
 
     Args:
         camera: the camera.
@@ -300,7 +302,7 @@ def _points(camera: PinholeCamera, depth_m: Depths) -> Depths:
 
 
 def _lay_over(image: Image, backdrop: _Backdrop, box: Box, layer: Layer) -> None:
-    """Draw a layer over a picture where it is nearer to the camera, with smooth edges.
+    """Draw those parts of a layer that are nearer to the camera over a picture, with smooth edges.
 
     Args:
         image: the picture, which is changed.

@@ -1,4 +1,4 @@
-"""Pictures of a simulation: of the scene, the cameras with detections, and the belief."""
+"""Pictures of a simulation: the scene, the cameras' images with detections, and the belief."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ SMALLEST_PX = 16
 LARGEST_PX = 4096
 """Maximum width and height of a picture [px]."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
-"""MuJoCo's settings of the visual quality of depth images."""
+"""Settings of MuJoCo's visual quality for depth images."""
 MOSAIC_TILE = (640, 360)
 """Width and height of a camera's picture in a mosaic [px]."""
 SIDES = (
@@ -56,14 +56,14 @@ SIDES = (
 )
 """Viewpoints for pictures of the belief: name, eye and target relative to the robot's base [m]."""
 SIDES_HFOV_DEG = 55.0
-"""Horizontal field of view of these viewpoints [deg]."""
+"""Horizontal field of view of the viewpoints `SIDES` [deg]."""
 CameraChoice: TypeAlias = int | str | CameraConfig | PinholeCamera | None
-"""Index or name of a camera of the rig, name of a viewpoint, or a camera; None for the task's
-viewpoint."""
+"""Choice of a camera: index or name of a camera of the rig, name of a viewpoint, or a camera; None
+for the task's viewpoint."""
 
 
 class Size(NamedTuple):
-    """Size of a picture."""
+    """Size of a picture in pixels."""
 
     width: int
     """Width of the picture [px]."""
@@ -99,7 +99,7 @@ class Glance:
     motion: WorkerMotion
     """Poses of the workers, arrays (W, S, ...)."""
     look: Look | None
-    """Appearance of the episode; None for the scene as built."""
+    """Appearance of the episode; None for the default appearance."""
     markers_world: Points3
     """(M, 3) positions of the task's markers [m]."""
     cameras: tuple[PinholeCamera, ...]
@@ -107,15 +107,15 @@ class Glance:
     estimate: PoseEstimate
     """Belief about the workers, a batch of one."""
     keypoints: Keypoints | None
-    """Last detections, a batch of one; None without cameras."""
+    """Last detected keypoints, a batch of one; None without cameras."""
     windows: list[list[Roi | None]]
-    """Window of each worker's crop in each camera's image."""
+    """Window of each worker's crop in each camera's image, indexed by worker and camera."""
     crops: list[Image | None]
-    """Crop of the first worker from each camera, the input of the pose network."""
+    """Crop of the first worker from each camera, which is the input of the pose network."""
     shield_rad_s: float = 0.0
     """Norm of the shield's change of the last command [rad/s]."""
     solids: tuple[Solids, ...] = ()
-    """Capsules from which distances are computed, for the overlay "capsules"."""
+    """Capsules that are drawn by the overlay "capsules"."""
 
 
 class Views:
@@ -126,13 +126,13 @@ class Views:
     another thread.
 
     Args:
-        simulation: the simulation.
+        simulation: simulation of the environments that are shown.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
         self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
-        """Size of the pictures and the renderer, by purpose."""
+        """Size of the pictures and renderer for each purpose (a key of `_MAKERS`)."""
 
     def picture(
         self,
@@ -176,7 +176,7 @@ class Views:
         return image
 
     def glance(self, b: int = 0, capsules: bool = False) -> Glance:
-        """Return a copy of environment `b`'s present state, with its solids if `capsules`."""
+        """Return a copy of environment `b`'s present state, with capsules if `capsules` is True."""
         simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
@@ -193,12 +193,12 @@ class Views:
         )
 
     def pose(self, b: int = 0) -> Pose:
-        """Return the present pose of environment `b`."""
+        """Return the present poses of robot, objects and workers in environment `b`."""
         motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
         return Pose(self.simulation.physics.qpos[b], motion)
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
-        """Return a picture of the scene, overlaid with the estimated skeletons.
+        """Return a picture of the scene with the estimated skeletons.
 
         Args:
             width: width of the picture [px].
@@ -285,7 +285,7 @@ class Views:
         return images
 
     def mosaic(self, b: int = 0) -> Image:
-        """Return one picture with all cameras of environment `b`, tiled in two columns."""
+        """Return a mosaic of the images of all cameras of environment `b`, in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
@@ -298,7 +298,7 @@ class Views:
         return {**self.__dict__, "_renderers": {}}
 
     def _make_view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
-        """Return the chosen camera or viewpoint with a picture of this size."""
+        """Return the chosen camera or viewpoint as a camera for pictures of the given size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
         return resize(chosen, width, height)
@@ -317,7 +317,7 @@ class Views:
     def _through_cameras(
         self, width: int, height: int, seen: Glance, cameras: Sequence[PinholeCamera]
     ) -> list[Image]:
-        """Render the pictures of cameras with or without lenses, without shadows."""
+        """Render the pictures of cameras, with or without lenses, without shadows."""
         if all(camera.lens is None for camera in cameras):
             return self._draw([resize(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
@@ -341,7 +341,7 @@ class Views:
         return [stage.picture(camera, shadows) for camera in cameras]
 
     def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
-        """Return the posed renderer for a purpose, which is made anew if the picture size changes.
+        """Return the posed renderer for a purpose; make a new one if the picture size has changed.
 
         Args:
             purpose: a key of `_MAKERS`.
@@ -360,7 +360,7 @@ class Views:
 
 
 def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
-    """Return the chosen camera of a rig, name of a viewpoint, or custom camera.
+    """Return the camera, or the name of the viewpoint, that a choice refers to.
 
     Raises:
         ConfigError: there is no such camera.

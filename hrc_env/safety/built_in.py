@@ -1,17 +1,18 @@
-"""The built-in shields: joint velocities that keep every constraint of `safety.constraints`.
+"""The built-in shields, which limit joint velocities by the constraints of `safety.constraints`.
 
-"ssm" scales all joint velocities by one factor, which keeps the path. "qp" and "pfl" take the
-nearest velocities that the arm can reach in a step. A constraint that demands a retreat is split
-into two: one not to approach, with a very large weight, and one to retreat. With a single
-constraint, an arm that retreats from one hand would push its wrist into the other hand.
+"ssm" scales all joint velocities by one factor, which preserves the path. "qp" and "pfl" select the
+nearest velocities that the arm can reach within a step. A constraint that requires a retreat is
+split into two: a constraint against approaching, with a very large weight, and a constraint to
+retreat. With a single constraint, an arm that retreats from one hand would push its wrist into the
+other hand.
 
 A task may allow parts of estimated bodies to touch the robot's hand (`Task.allowed_contact`), such
 as the forearms and hands of a worker who takes a tool. While these approach no faster than their
 region of the body tolerates in a contact with this arm and its load
-(`contact.permitted_contact_speed`), no link retreats from them, which keeps the held object in
+(`contact.permitted_contact_speed`), no link retreats from them, which keeps the held object within
 reach. The last link and its load may touch them at `contact_speed_m_s` at most, if the region
-tolerates the sum of both speeds. Nothing changes for other people, for other parts of their bodies,
-and for the approach of other links, except that these links may approach at `creep_m_s`.
+tolerates the sum of both speeds. Other links may approach at `creep_m_s`. The constraints for all
+other people and parts of the body are unchanged.
 """
 
 import math
@@ -46,7 +47,8 @@ from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
 NO_APPROACH_WEIGHT, RETREAT_WEIGHT = 1e4, 30.0
-"""Weights of constraint violations [m/s] relative to changes of joint velocities [rad/s]."""
+"""Weights of violations [m/s] of the constraints against approaching and of those to retreat,
+relative to changes of joint velocities [rad/s]."""
 TOLERANCE_M_S = 1e-6
 """Violation below which a constraint counts as satisfied [m/s]."""
 
@@ -57,7 +59,7 @@ class ShieldOutput(NamedTuple):
     velocities: JointVelocities
     """Joint velocities that the arm receives (B, N) [rad/s]."""
     values: Mapping[str, Floats]
-    """Reported values (B,) by name; each becomes "shield/NAME" in info."""
+    """Reported values (B,) by name; info contains each of them as "shield/NAME"."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,9 +67,9 @@ class ArmPose:
     """Poses of the links and capsules of the robots that a shield commands."""
 
     model: RobotModel
-    """Constants of the robot."""
+    """Constant properties of the robot."""
     frames: Transforms
-    """Frame of every joint's link (B, N, 4, 4), world_from_link."""
+    """Poses of the links in the world (B, N, 4, 4)."""
     links: Ints
     """Index of the link that carries each capsule (K,)."""
 
@@ -75,12 +77,12 @@ class ArmPose:
 def limit_command(
     belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
 ) -> ShieldOutput:
-    """Return the nearest safe joint velocities, as a `shield.Shield` with these settings.
+    """Return the safe joint velocities nearest to the given ones; implements `shield.Shield`.
 
     The reported values are
 
     - "clearance_m" (B,): the smallest clearance D of the relevant pairs [m], NaN if there are none;
-    - "slack" (B,): the greatest violation of a constraint, including retreats [m/s];
+    - "slack" (B,): the maximum violation of a constraint, including retreats [m/s];
     - "unknown" (B,): 1 while a worker's position is unknown or the last detection is too old.
 
     Args:
@@ -90,7 +92,7 @@ def limit_command(
         config: kind, margins and limits.
 
     Raises:
-        ConfigError: the belief has no `RobotModel` or no command in force.
+        ConfigError: the belief lacks the `RobotModel` or the current command.
     """
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
     found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
@@ -110,7 +112,7 @@ def limit_command(
 
 
 def describe_pose(belief: Belief) -> ArmPose:
-    """Return the poses of links and capsules; loads are attached to the last link."""
+    """Return the poses of links and capsules. Loads are attached to the last link."""
     model = require(belief.model, "The robot's model (RobotModel) for a built-in shield")
     n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
@@ -126,9 +128,9 @@ def build_constraints(
     dt_s: float,
     config: ShieldConfig,
 ) -> Constraints:
-    """Return the tightest constraints of every robot.
+    """Return the tightest constraints on the joint velocities of every robot.
 
-    For "ssm", only velocities between rest and `wanted` are within reach; for other kinds, those
+    For "ssm", the reachable velocities are those between zero and `wanted`; for other kinds, those
     that the slew rate permits until the next command.
 
     Args:
@@ -176,7 +178,7 @@ def build_constraints(
 
 
 def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
-    """Return the estimated bodies.
+    """Return the estimated bodies of the workers.
 
     Lost workers (B, W) are assumed to be at rest at their last estimate.
     """
@@ -205,17 +207,17 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
 
 @dataclass(frozen=True, slots=True)
 class AllowedTouches:
-    """Speed limits of the allowed touches of estimated bodies."""
+    """Speed limits of the touches of estimated bodies that are allowed."""
 
     segment_m_s: Floats
-    """Greatest relative speed of an allowed touch of each segment (B, W, S) [m/s]; 0 if none is
+    """Maximum relative speed of a touch of each segment (B, W, S) [m/s]; 0 if no touch is
     allowed."""
     capsule_m_s: Floats
-    """Greatest speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
+    """Maximum speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
 
 
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the allowed touches: all of them for "pfl", otherwise those that the task permits."""
+    """Return the allowed touches: all touches for "pfl", otherwise those that the task permits."""
     model, links = pose.model, pose.links
     shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":
@@ -237,7 +239,7 @@ def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -
 def scale_velocities(
     constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
 ) -> None:
-    """Scale the velocities of all joints by one factor until every constraint holds.
+    """Scale the velocities of all joints by one factor so that every constraint is satisfied.
 
     Args:
         constraints: constraints of every robot.
@@ -259,9 +261,10 @@ def scale_velocities(
 def find_nearest_velocities(
     constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
 ) -> None:
-    """Find the nearest joint velocities within reach that keep the constraints.
+    """Find the reachable joint velocities nearest to `wanted` that satisfy the constraints.
 
-    If the wanted velocities keep all constraints, they are allowed, within reach or not.
+    If the wanted velocities satisfy all constraints, they are returned unchanged, even if they are
+    not reachable.
 
     Args:
         constraints: constraints of every robot.
@@ -304,14 +307,14 @@ def limit_speed(
     limit_m_s: Floats,
     allowed: JointVelocities,
 ) -> None:
-    """Scale joint velocities until no end of a capsule exceeds a speed limit.
+    """Scale joint velocities so that no end point of a capsule exceeds a speed limit.
 
     Args:
         frames: (B, N, 4, 4) world_from_link.
-        slides: (N,) mask of the joints that are slides.
+        slides: (N,) mask of the prismatic joints.
         links: (K,) index of the link that carries each capsule.
         capsules: (B, K, 2, 3) end points in the world [m].
-        limit_m_s: (B,) speed limit of every point [m/s]; infinite for none.
+        limit_m_s: (B,) speed limit of every point [m/s]; infinite if there is no limit.
         allowed: (B, N) joint velocities, changed in place [rad/s].
     """
     for e in range(len(allowed)):
@@ -333,7 +336,7 @@ def limit_speed(
 
 @kernel
 def find_slack(constraints: Constraints, allowed: JointVelocities, slack: Floats) -> None:
-    """Write the greatest constraint violation of the `allowed` velocities to `slack` (B,) [m/s]."""
+    """Write the maximum constraint violation of the `allowed` velocities to `slack` (B,) [m/s]."""
     for e in range(len(allowed)):
         slack[e] = 0.0
         for r in range(constraints.n_rows[e]):

@@ -14,7 +14,7 @@ from hrc_env.core.typing import Bools, Floats
 
 KINDS = ("qp", "ssm", "pfl")
 MARGINS = ("margin_m", "hand_margin_m")
-"""Settings that may be negative."""
+"""Names of the settings of `ShieldConfig` that may be negative."""
 IS_FOREARM_OR_HAND: Bools = np.array(
     [False] * 6 + [True] * 2 + [False] * (len(SEGMENT_ENDS) - 8) + [True] * len(HAND_SEGMENTS)
 )
@@ -22,17 +22,16 @@ IS_FOREARM_OR_HAND: Bools = np.array(
 
 
 class ShieldParams(NamedTuple):
-    """Numbers of a `ShieldConfig` in the form that kernels read."""
+    """Settings of a `ShieldConfig` as arguments of compiled kernels."""
 
     margins_m: Floats
     """`margin_m` or `hand_margin_m` of each segment of a body (S,) [m]."""
     n_sigmas: float
-    """Uncertainty margin Z_d in standard deviations."""
+    """Uncertainty margin Z_d, in standard deviations."""
     min_uncertainty_m: float
     """Lower bound on the uncertainty margin Z_d [m]."""
     prediction_growth_m_s: float
-    """Share of the standard deviation that comes from prediction, per second without a detection
-    [m/s]."""
+    """Part of the standard deviation due to prediction, per second without a detection [m/s]."""
     single_view_std_m: float
     """Standard deviation above which a part of the body is assumed to be located by a single camera
     [m]."""
@@ -48,9 +47,10 @@ class ShieldParams(NamedTuple):
     reaction_s: float
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float
-    """Greatest deceleration of a point of the robot [m/s^2]."""
+    """Maximum deceleration of a point of the robot [m/s^2]."""
     gain_hz: float
-    """Speed of a retreat divided by the depth of the violation [1/s]."""
+    """Gain of a retreat: its speed divided by the amount by which the clearance is negative
+    [1/s]."""
     retreat_m_s: float
     """Upper bound on the speed of a retreat [m/s]."""
     creep_m_s: float
@@ -63,8 +63,8 @@ class ShieldConfig:
     """Settings of a built-in shield: its kind, margins and limits.
 
     The clearance D is the gap between the surfaces of a robot's capsule and a segment of an
-    estimated body, less a margin, less the uncertainty margin Z_d, less the worker's travel until
-    the robot has stopped.
+    estimated body, minus a margin, minus the uncertainty margin Z_d, minus the distance that the
+    worker covers until the robot has stopped.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {
@@ -79,13 +79,13 @@ class ShieldConfig:
     """Current names of renamed fields, by their old names."""
 
     kind: str = "qp"
-    """Method: "qp" takes the nearest joint velocities that keep all constraints; "ssm" scales all
-    joint velocities by one factor; "pfl" is "qp" that also allows touches, up to the speed that the
-    touched region of the body tolerates."""
+    """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
+    "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
+    the speed that the touched region of the body tolerates."""
     margin_m: float = 0.05
-    """Distance subtracted from every gap, since bodies are not capsules [m]. With a negative value
-    the shield permits less distance than the estimate requires, which `experiment price` uses to
-    find an equal rate of contacts."""
+    """Distance subtracted from every gap, because capsules only approximate bodies [m]. With a
+    negative value, the shield permits smaller distances than the estimate requires; the command
+    `experiment price` uses such values to compare shields at an equal rate of contacts."""
     hand_margin_m: float = 0.13
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
     nearly all contacts [m]."""
@@ -95,12 +95,12 @@ class ShieldConfig:
     min_uncertainty_m: float = 0.05
     """Lower bound on the uncertainty margin Z_d [m]."""
     prediction_growth_m_s: float = 0.7
-    """Share of the standard deviation that comes from prediction, per second since a part of the
-    body was last detected [m/s]. It counts once instead of `n_sigmas` times, because the predicted
-    uncertainty of late images that carry their time is too large."""
+    """Part of the standard deviation due to prediction, per second since a part of the body was
+    last detected [m/s]. It is weighted with 1 instead of `n_sigmas`, because the predicted
+    uncertainty is too large for delayed images with time stamps."""
     single_view_std_m: float = 0.08
     """Standard deviation above which a part of the body is assumed to be located by a single
-    camera, whose errors exceed the reported ones [m]."""
+    camera, for which actual errors exceed the estimated ones [m]."""
     single_view_sigmas: float = 5.0
     """Additional factor on the standard deviation above `single_view_std_m`."""
     worker_speed_m_s: float | None = None
@@ -109,34 +109,37 @@ class ShieldConfig:
     worker_speed_margin_m_s: float = 0.2
     """Amount by which a worker may be faster than estimated [m/s]."""
     worker_time_s: float = 0.2
-    """Time for which a worker is assumed to keep approaching at that speed [s]."""
+    """Time for which a worker is assumed to approach the robot at the worker's speed [s]."""
     latency_s: float = 0.0
-    """Additional age of the estimate, for late images that do not carry their time [s]."""
+    """Additional age of the estimate, for delayed images without time stamps [s]."""
     reaction_s: float = 0.08
     """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float = 3.0
-    """Greatest deceleration of a point of the robot, if its joints can achieve it [m/s^2]."""
+    """Maximum deceleration of a point of the robot, if its joints can achieve it [m/s^2]."""
     retreat_gain_hz: float = 4.0
-    """Speed of a retreat divided by the amount by which the clearance is negative [1/s]."""
+    """Gain of a retreat: its speed divided by the amount by which the clearance is negative
+    [1/s]."""
     max_retreat_m_s: float = 1.0
-    """Upper bound on the speed of a retreat [m/s]; with 0 the robot only stops approaching, as
-    "ssm" always does."""
+    """Upper bound on the speed of a retreat [m/s]. With 0 the robot stops approaching but does not
+    retreat, as is always the case with "ssm"."""
     stale_after_s: float = 0.25
-    """Time since the last detection after which a worker counts as lost [s]. A lost worker may have
-    walked at `worker_speed_m_s` (None: 1.6 m/s) from the last detected position, which the robot
-    does not approach within that distance. Lost workers are unknown, like those without a track;
-    images that are later than this time slow the robot down."""
+    """Time since the last detection after which a worker counts as lost [s]. A lost worker is
+    assumed to have walked at `worker_speed_m_s` (1.6 m/s if it is None) from the last detected
+    position, and the robot does not come closer to that position than the distance walked. Lost
+    workers count as unknown, like those without a track. Images that arrive later than this time
+    slow the robot down."""
     unknown_speed_limit_m_s: float = 0.25
-    """Speed limit of every point of the robot while a worker is lost, and near floor that only one
-    camera has seen empty [m/s]; 0 stops the robot. Between 1 m and 0.25 m from the lost worker's
-    last position the limit decreases to zero. Before the first image the robot stands still."""
+    """Speed limit of every point of the robot while a worker is lost, and near patches of floor
+    that only one camera has observed to be empty [m/s]; 0 stops the robot. Between 1 m and 0.25 m
+    from the lost worker's last position, the limit decreases to zero. The robot does not move
+    before the first image."""
     contact_speed_m_s: float = 0.25
-    """Greatest speed of the robot's hand and its load towards segments that a task allows to touch
-    them, as in a handover (`Task.allowed_contact`), but no faster than the region of the body
-    tolerates [m/s]; 0 forbids touches."""
+    """Maximum speed of the robot's hand and its load towards segments of the body that may touch
+    them in a task such as a handover (`Task.allowed_contact`) [m/s]. It is further limited to the
+    speed that the region of the body tolerates; 0 forbids touches."""
     creep_m_s: float = 0.02
-    """Speed at which other links may approach these segments if the clearance permits less [m/s];
-    small corrections keep an object in place while it is handed over."""
+    """Speed at which other links may approach these segments even if the clearance permits less
+    [m/s]. It permits the small corrections that hold an object in position during a handover."""
 
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
@@ -149,7 +152,7 @@ class ShieldConfig:
         check_fields(self, "not be negative", *(name for name in given if name not in MARGINS))
 
     def make_params(self) -> ShieldParams:
-        """Return the settings as kernels read them."""
+        """Return the settings as arguments of compiled kernels."""
         speed_m_s = self.worker_speed_m_s
         return ShieldParams(
             margins_m=np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m),
@@ -174,4 +177,4 @@ PRESETS = {
     "qp": ShieldConfig("qp"),
     "pfl": ShieldConfig("pfl", max_retreat_m_s=0.0),
 }
-"""The built-in shields, by the names that `shield=` accepts."""
+"""Settings of the built-in shields, by the names that the argument `shield` accepts."""

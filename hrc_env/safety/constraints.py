@@ -1,4 +1,4 @@
-"""Constraints n.J qd <= b on how fast a robot's capsules may approach estimated bodies.
+"""Constraints n.J qd <= b on the speed at which a robot's capsules approach estimated bodies.
 
 For every pair of a robot's capsule and a segment of an estimated body, n is the unit vector from
 the robot's nearest point to the body's, and the clearance is
@@ -8,20 +8,22 @@ the robot's nearest point to the body's, and the clearance is
 with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
 of predicted^2 + seen^2. From `ShieldConfig` come k `n_sigmas`, k' `single_view_sigmas`, s'
 `single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is `margin_m` or
-`hand_margin_m`. If a body was not detected for a while, as with late images, most of the deviation
-comes from prediction, which overestimates it; a larger deviation belongs to a part that a single
-camera locates, whose errors exceed the reported ones. Where D >= 0 the robot may approach as fast
-as it can brake within D (the robot's share of `separation.protective_distance`); where D < 0 it has
-to retreat. Constraints that no command within reach violates are left out.
+`hand_margin_m`. If a body has not been detected recently, for example because images are delayed,
+most of the deviation is due to prediction, which overestimates it. A `seen` above s' indicates a
+part that a single camera locates, for which actual errors exceed the estimated ones. If D >= 0, the
+robot may approach at a speed from which it can stop within D (the robot's part of
+`separation.protective_distance`); if D < 0, it must retreat. Constraints that no reachable command
+violates are omitted.
 
-A segment that may be touched causes no retreat while it approaches no faster than its region of the
-body tolerates in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed
-whose sum with the segment's is below that limit; points of other capsules may approach at
-`creep_m_s` if D permits less.
+A segment that may be touched causes no retreat while its speed of approach does not exceed the
+contact speed that its region of the body tolerates. Capsules that may touch it brake within gap -
+margin - Z_d until the sum of their speed and that of the segment is below that limit. Points of
+other capsules may approach at `creep_m_s` if D permits less.
 
 A worker without a recent detection may be anywhere within walking distance of the last detected
-position. That distance is subtracted from D, too, and where D < 0 the robot neither approaches nor
-retreats. The same holds for people on floor that no camera has seen empty.
+position. That distance is subtracted from D as well, and if D < 0, the robot neither approaches nor
+retreats. The same holds for people who may be on patches of floor that no camera has observed to be
+empty.
 """
 
 import math
@@ -51,28 +53,29 @@ from hrc_env.safety.config import ShieldParams
 MAX_CONSTRAINTS = 32
 """Maximum number of constraints of one robot; if there are more, the tightest are kept."""
 ABSENT_M = 1e3
-"""Coordinate beyond which a capsule belongs to an absent load [m]."""
+"""Coordinate beyond which a capsule is regarded as that of an absent load [m]."""
 RANKING_HZ = 1e-4
-"""Gain of the retreat from positions where a lost worker may be, on D [1/s]; it causes hardly any
-motion, but makes the nearest pairs the tightest constraints."""
+"""Ratio of retreat speed to -D for positions where a lost worker may be [1/s]. It causes hardly any
+motion, but makes the constraints of the nearest pairs the tightest ones."""
 MIN_FOREARM_M = 0.1
-"""Lower bound on an estimated forearm's length, which affects the speed of its fingertips [m]."""
+"""Lower bound on the estimated length of a forearm, from which the speed of the fingertips is
+extrapolated [m]."""
 _N_LIMBS = len(SEGMENT_ENDS)
 _JOINTS: Ints = np.array(
     [[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS]
     + [[(wrist, wrist)] * 2 for _, wrist, *_ in HAND_SEGMENTS]
 )
-"""The two joints whose mean is each end of a segment (S, 2, 2); both ends of a hand are its
-wrist."""
+"""Indices of the two joints with each end of a segment at their midpoint (S, 2, 2). Both ends of a
+hand are at its wrist."""
 
 
 class Robots(NamedTuple):
     """The robots that a shield commands, one row per environment."""
 
     frames: Transforms
-    """Frame of every joint's link (B, N, 4, 4), world_from_link."""
+    """Poses of the links in the world (B, N, 4, 4)."""
     slides: Bools
-    """Whether each joint is a slide (N,)."""
+    """Mask of the prismatic joints (N,)."""
     links: Ints
     """Index of the link that carries each capsule (K,)."""
     capsules: Capsules
@@ -80,11 +83,11 @@ class Robots(NamedTuple):
     radii_m: Floats
     """Radius of each capsule (K,) [m]."""
     low: JointVelocities
-    """Least joint velocities within reach (B, N) [rad/s]."""
+    """Minimum reachable joint velocities (B, N) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (B, N) [rad/s]."""
+    """Maximum reachable joint velocities (B, N) [rad/s]."""
     slew: Floats
-    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
+    """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Bodies(NamedTuple):
@@ -101,58 +104,60 @@ class Bodies(NamedTuple):
     age_s: Floats
     """Time since each joint was last supported by a measurement (B, W, J) [s]."""
     is_located: Bools
-    """Whether the worker has a track, or is lost and its last position is known (B, W)."""
+    """Mask (B, W) of the workers that have a track, or are lost but have a known last position."""
     moved_m: Floats
     """Distance that a lost worker may have walked since the last detection (B, W) [m]; 0 for
     others."""
     contact_m_s: Floats
-    """Greatest relative speed of an allowed touch of each segment (B, W, S) [m/s]; 0 if none is
+    """Maximum relative speed of a touch of each segment (B, W, S) [m/s]; 0 if no touch is
     allowed."""
     robot_share_m_s: Floats
-    """Greatest speed of each capsule of the robot in an allowed touch (K,) [m/s]."""
+    """Maximum speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
 
 
 class UnseenFloors(NamedTuple):
-    """Floor on which people may be that no camera has detected."""
+    """Patches of floor on which there may be people that no camera has detected."""
 
     centres_world: Points3
     """Centres of the patches of floor (N, 3) [m]."""
     level: Ints
     """State of each patch (B, N): `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
     reach_m: Floats
-    """Distance from a centre within which hands may be (B,) [m]."""
+    """Distance from the centre of a patch within which a person's hands may be (B,) [m]."""
 
 
 class Constraints(NamedTuple):
     """The constraints J qd <= b on joint velocities, and the box low <= qd <= high."""
 
     J: Floats
-    """Rows n.J, of which the first `n_rows` are used (B, M, N) [m/rad, for slides 1]."""
+    """Rows n.J (B, M, N) of the constraints, of which the first `n_rows` are used [m/rad; 1 for
+    prismatic joints]."""
     b: Floats
-    """Greatest speed of approach (B, M) [m/s]; if negative, the least speed of retreat."""
+    """Maximum speed of approach (B, M) [m/s]; a negative value is the minimum speed of a
+    retreat."""
     n_rows: Ints
     """Number of constraints of each robot (B,)."""
     low: JointVelocities
-    """Least joint velocities within reach (B, N) [rad/s]."""
+    """Minimum reachable joint velocities (B, N) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (B, N) [rad/s]."""
+    """Maximum reachable joint velocities (B, N) [rad/s]."""
     clearance_m: Floats
     """Smallest clearance D of the relevant pairs (B,) [m]; infinite if there are none."""
 
 
 class Arm(NamedTuple):
-    """One robot of `Robots`; the fields are those of one row."""
+    """One robot, with the fields of one row of `Robots`."""
 
     frames: Transforms
-    """Frame of every joint's link (N, 4, 4), world_from_link."""
+    """Poses of the links in the world (N, 4, 4)."""
     slides: Bools
-    """Whether each joint is a slide (N,)."""
+    """Mask of the prismatic joints (N,)."""
     low: JointVelocities
-    """Least joint velocities within reach (N,) [rad/s]."""
+    """Minimum reachable joint velocities (N,) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities within reach (N,) [rad/s]."""
+    """Maximum reachable joint velocities (N,) [rad/s]."""
     slew: Floats
-    """Greatest rate of change of each joint velocity (N,) [rad/s^2]."""
+    """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
 class Body(NamedTuple):
@@ -167,7 +172,7 @@ class Body(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """The nearest points of a robot's capsule and a body's segment."""
+    """Distance and parameter of the nearest points of a robot's capsule and a body's segment."""
 
     distance_m: float
     """Distance between the two axes [m]."""
@@ -185,10 +190,10 @@ class Approach(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """The velocities of a point of a robot along n that commands can cause."""
+    """Limits on the motion of a point of a robot along n that commands can cause."""
 
     max_speed_m_s: float
-    """Greatest speed of approach within reach [m/s]."""
+    """Maximum speed of approach that a command can reach [m/s]."""
     deceleration_m_s2: float
     """Deceleration that the joints can achieve along n [m/s^2]."""
 
@@ -203,7 +208,7 @@ def add_worker_constraints(
         robots: link frames, capsules and velocities within reach.
         bodies: estimated segments with velocities, covariances and ages.
         params: margins, limits and gains of the shield.
-        out: receives `J`, `b`, `n_rows` and `clearance_m`; the box is left unchanged.
+        out: receives `J`, `b`, `n_rows` and `clearance_m`; `low` and `high` are left unchanged.
     """
     n_caps, n_segments = robots.capsules.shape[1], bodies.segments.shape[2]
     rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
@@ -251,13 +256,13 @@ def add_worker_constraints(
 def add_floor_constraints(
     robots: Robots, floor: UnseenFloors, params: ShieldParams, out: Constraints
 ) -> None:
-    """Add constraints that let robots brake before people on floor that was not seen empty.
+    """Add constraints on the approach of robots to patches of floor that may not be empty.
 
     Args:
         robots: link frames, capsules and velocities within reach.
         floor: patches of floor and their states.
         params: margins, limits and gains of the shield.
-        out: constraints so far, to which these are added.
+        out: present constraints, to which the new ones are added.
     """
     body, rod, limb = np.empty((2, 3)), np.empty(5), np.empty(5)
     normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
@@ -303,17 +308,17 @@ def bound_capsule(ends: Floats, radius_m: float, sphere: Floats) -> None:
 
 @kernel
 def sphere_gap(one: Floats, other: Floats) -> float:
-    """Return the distance between the surfaces of two spheres [m], given as by `bound_capsule`."""
+    """Return the distance between the surfaces of two spheres from `bound_capsule` [m]."""
     dx, dy, dz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz) - one[3] - other[3]
 
 
 @kernel
 def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldParams) -> float:
-    """Return an upper bound on the distance in which a capsule can be brought to rest [m].
+    """Return an upper bound on the stopping distance of a capsule [m].
 
-    A pair with a greater clearance is irrelevant. No point of a capsule is faster than its faster
-    end. The bound of an absent load is -inf.
+    Pairs with a greater clearance are irrelevant. The bound uses the fact that no point of a
+    capsule is faster than the faster of its ends. It is -inf for an absent load.
 
     Args:
         arm: the robot.
@@ -342,7 +347,7 @@ def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldPara
 def bound_deduction(body: Body, s: int, params: ShieldParams) -> float:
     """Return an upper bound on the difference between gap and clearance of segment `s` [m].
 
-    It is valid for every direction of n.
+    The bound holds for every direction of n.
     """
     squared, variance = 0.0, 0.0
     for end in range(2):
@@ -363,7 +368,7 @@ def find_uncertainty(std_m: float, age_s: float, params: ShieldParams) -> float:
     Args:
         std_m: standard deviation of the position along n [m].
         age_s: time since the part of the body was last detected [s].
-        params: factors on both shares of the deviation.
+        params: factors on both parts of the standard deviation.
     """
     predicted = min(std_m, params.prediction_growth_m_s * age_s)
     seen = math.sqrt(std_m * std_m - predicted * predicted)
@@ -391,7 +396,7 @@ def find_travel(speed_m_s: float, params: ShieldParams) -> float:
 def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
     """Return the velocity of an end of segment `s` [m/s].
 
-    The tip of a hand rotates with its forearm.
+    The tip of a hand moves with the rotation of its forearm.
     """
     one, two = body.velocity[_JOINTS[s, end, 0]], body.velocity[_JOINTS[s, end, 1]]
     x, y, z = 0.5 * (one[0] + two[0]), 0.5 * (one[1] + two[1]), 0.5 * (one[2] + two[2])
@@ -407,7 +412,7 @@ def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
 
 @kernel
 def find_segment_age(age_s: Floats, s: int) -> float:
-    """Return the time since any joint of segment `s` was detected [s], from all ages (J,)."""
+    """Return the time since any joint of segment `s` was last detected [s]; `age_s` is (J,)."""
     least = np.inf
     for end in range(2):
         for k in range(2):
@@ -424,7 +429,7 @@ def find_nearest(capsule: Floats, segment: Floats, point: Floats, normal: Floats
         capsule: (2, 3) end points [m].
         segment: (2, 3) end points [m].
         point: (3,) receives the nearest point on the robot's axis [m].
-        normal: (3,) receives n, the unit vector from there to the body.
+        normal: (3,) receives n, the unit vector from that point to the body.
     """
     squared, u, t = closest_parameters(capsule[0], capsule[1], segment[0], segment[1])
     distance = math.sqrt(squared)
@@ -461,7 +466,7 @@ def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach
 
 @kernel
 def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -> Reach:
-    """Write n.J of a point of a robot to `row`, and return the velocities along n within reach.
+    """Write n.J of a point of a robot to `row`, and return the reachable motion along n.
 
     Args:
         arm: the robot.
@@ -485,11 +490,11 @@ def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -
 def bound_approach(
     clearance_m: float, braking_m_s2: float, is_lost: bool, params: ShieldParams
 ) -> float:
-    """Return the greatest speed of approach [m/s]; a negative value is the least speed of retreat.
+    """Return the maximum speed of approach [m/s]; a negative value is the minimum speed of retreat.
 
     Args:
         clearance_m: clearance D [m].
-        braking_m_s2: greatest deceleration of the point [m/s^2].
+        braking_m_s2: maximum deceleration of the point [m/s^2].
         is_lost: whether the worker's position is only known from an earlier detection; the robot
             does not retreat from such workers.
         params: reaction time, and gain and limit of a retreat.
@@ -507,13 +512,13 @@ def bound_approach(
 def bound_touch(
     near_m: float, touch_m_s: float, braking_m_s2: float, params: ShieldParams
 ) -> float:
-    """Return the greatest speed of approach to a segment that may be touched [m/s].
+    """Return the maximum speed of approach to a segment that may be touched [m/s].
 
     Args:
         near_m: gap - margin - Z_d [m].
         touch_m_s: allowed speed of the robot in the touch [m/s]; with 0 it only makes small
             corrections.
-        braking_m_s2: greatest deceleration of the point [m/s^2].
+        braking_m_s2: maximum deceleration of the point [m/s^2].
         params: reaction time and speed of corrections.
     """
     if touch_m_s == 0.0:
@@ -528,7 +533,7 @@ def keep_tightest(row: Floats, bound: float, e: int, out: Constraints) -> None:
 
     Args:
         row: (N,) row n.J.
-        bound: greatest speed of approach [m/s].
+        bound: maximum speed of approach [m/s].
         e: index of the environment.
         out: constraints so far.
     """

@@ -1,11 +1,12 @@
 """Power and force limiting: contact limits for each region of the body.
 
 The limits are those of ISO/TS 15066:2016, Annex A, Tables A.2 and A.3 (now in ISO 10218-2:2025), as
-cited in open literature. Verify against the standard before certification. Pressures, which depend
-on edges, are not modelled.
+cited in open literature. Verify them against the standard before certification. Contact pressure,
+which depends on the shape of edges, is not modelled.
 
-Model (A.3.6): two masses and the region's spring, F = v sqrt(mu k), 1 / mu = 1 / m_H + 1 / m_R. For
-a fixed-base robot, m_R = M / 2 + m_L: half the mass of its moving parts plus its load.
+The model (A.3.6) consists of two masses and the spring of the body region: F = v sqrt(mu k) with 1
+/ mu = 1 / m_H + 1 / m_R. For a fixed-base robot, m_R = M / 2 + m_L is half the mass of its moving
+parts plus its load.
 """
 
 from dataclasses import dataclass
@@ -24,9 +25,9 @@ class BodyRegion:
     name: str
     """Name of the region."""
     quasi_static_n: float
-    """Greatest permitted clamping force [N]."""
+    """Maximum permitted clamping force [N]."""
     stiffness_n_m: float
-    """Stiffness of the region's spring [N/m]."""
+    """Spring constant of the region [N/m]."""
     mass_kg: float
     """Effective mass of the region [kg]."""
     is_touched: bool = True
@@ -34,7 +35,7 @@ class BodyRegion:
 
     @property
     def transient_n(self) -> float:
-        """Greatest force of a transient contact [N]: twice the quasi-static one; 0 for the head."""
+        """Maximum force of a transient contact [N]: twice the quasi-static one; 0 for the head."""
         return 2.0 * self.quasi_static_n * self.is_touched
 
 
@@ -67,12 +68,12 @@ SEGMENT_REGIONS: tuple[str, ...] = (
     *4 * ("lower leg",),
     *2 * ("hand and fingers",),
 )
-"""Region of the body of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`); if a
-segment has several regions, the one with the lowest limit."""
+"""Region of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`). If a segment
+covers several regions, it is the one with the lowest limit."""
 
 
 def find_region(name: str) -> BodyRegion:
-    """Return a region of the body by its name, or raise `ConfigError`."""
+    """Return the region of the body with a given name; raise `ConfigError` if there is none."""
     if name not in REGIONS:
         raise make_unknown_name_error("region of the body", name, REGIONS)
     return REGIONS[name]
@@ -112,7 +113,7 @@ def contact_force(region: str, relative_m_s: ArrayLike, robot_kg: ArrayLike) -> 
 
 
 def permitted_contact_speed(region: str, robot_kg: ArrayLike) -> Floats:
-    """Return the greatest relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
+    """Return the maximum relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
 
     It is 0 if no contact with the region is permitted.
 

@@ -1,4 +1,4 @@
-"""Cost of a step: its unsafe events, from the true separations and incidents."""
+"""Cost of a step, computed from the true separations and the incidents."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,23 +18,23 @@ _BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
     ),
     "near_miss": lambda incidents: incidents["is_near_miss"].sum(1).astype(float),
 }
-"""Components of the cost (B,) computed from incidents (B, W): number of contacts that begin while
-the robot moves towards the worker; sum of the forces of contacts that begin, relative to what the
-body tolerates; 1 if the robot moves towards a worker within the protective distance; number of near
-misses."""
+"""Functions that compute components of the cost (B,) from incidents (B, W): the number of contacts
+that begin while the robot moves towards the worker; the sum of the forces of contacts that begin,
+relative to the permitted forces; 1 if the robot moves towards a worker within the protective
+distance; and the number of near misses."""
 COMPONENTS = ("proximity", "contact", *_BY_INCIDENT)
-"""Components that `CostConfig.components` may name."""
+"""Names of the components that `CostConfig.components` accepts."""
 FORMER_COMPONENT = "too_near"
 """Former name of the component "separation_violated"."""
 
 
 @dataclass(frozen=True, slots=True)
 class CostConfig:
-    """Events that count as unsafe, and whether a contact ends the episode."""
+    """Settings of the cost: unsafe events, and whether a contact ends the episode."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """Summands of the cost, chosen from `COMPONENTS`; the default cost is a number of control
-    steps."""
+    """Names of the components that are added up, from `COMPONENTS`. With the default ones, the cost
+    is a number of control steps."""
     proximity_m: float = 0.15
     """True separation between surfaces below which a step costs 1 [m]."""
     contact_terminates: bool = False
@@ -56,12 +56,14 @@ class CostConfig:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Cost of one step from separations, for each environment."""
+    """Costs of one step that depend on separations, for each environment."""
 
     proximity: Floats
-    """1 if surfaces came nearer than `CostConfig.proximity_m`, otherwise 0 (B,) [control steps]."""
+    """1 for environments in which the separation was below `CostConfig.proximity_m`, otherwise 0
+    (B,) [control steps]."""
     contact: Floats
-    """1 if surfaces touched, otherwise 0 (B,) [control steps]."""
+    """1 for environments in which the surfaces of a robot and a worker touched, otherwise 0 (B,)
+    [control steps]."""
     min_separation_m: Floats
     """Smallest true separation in the step (B,) [m]; infinite without workers."""
 
@@ -69,8 +71,8 @@ class Cost:
 def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
     """Return the cost of a step from the true separations (B, T, W) of its physics steps [m].
 
-    Contacts are detected by distance, because a hand that follows a recording can pass through a
-    thin arm between two steps of the contact solver.
+    Contacts are detected by distance instead of the contact solver, because a hand that follows a
+    recording can pass through a thin arm between two physics steps.
     """
     nearest_m = gaps_m.min((1, 2), initial=np.inf)
     return Cost(
@@ -88,7 +90,7 @@ def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) ->
     Args:
         cost: cost from separations.
         incidents: (B, W) incidents of the step.
-        config: selection of components.
+        config: settings that select the components.
     """
     components = {"proximity": cost.proximity, "contact": cost.contact}
     chosen = (name for name in config.components if name not in components)

@@ -3,11 +3,12 @@
 All values are computed from the true poses of the bodies at the physics steps of a control step. A
 *directed speed* is the rate at which one body's motion reduced the separation, with the other body
 held at its final pose. A contact begins when surfaces touch that have not touched for
-`CONTACT_GAP_S`, because an arm that is hit bounces. Its kind is the robot's motion in the previous
-control step, because the impact changes the motion in the step itself: the robot moved *towards*
-the worker, it was *fleeing*, or it was *standing*. The closing speed is that speed plus the
-worker's speed, which no impact changes. The force of a contact follows ISO/TS 15066, A.3, relative
-to what the touched region tolerates (`safety.contact`).
+`CONTACT_GAP_S`, because an arm that is hit bounces. The kind of a contact describes the robot's
+motion in the previous control step, because the impact changes the motion in the step itself: the
+robot moved *towards* the worker, was *fleeing*, or was *standing*. The closing speed is the sum of
+the robot's directed speed in the previous step and the worker's, which no impact changes. The force
+of a contact is computed by the model of ISO/TS 15066, A.3, and divided by the permitted force of
+the touched region (`safety.contact`).
 """
 
 from collections.abc import Sequence
@@ -29,22 +30,23 @@ from hrc_env.world import World
 
 KINDS = ("towards", "fleeing", "standing")
 MOVING_M_S = 0.05
-"""Directed speed above which a robot counts as moving towards a worker or fleeing [m/s], chosen by
-judgement. A robot that stands or flees cannot prevent a worker from walking into it."""
+"""Directed speed above which a robot counts as moving towards a worker or fleeing [m/s]. The value
+is an estimate. Slower robots count as standing; a robot that stands or flees cannot prevent a
+worker from walking into it."""
 CONTACT_GAP_S = 0.5
 """Time without touch after which another touch counts as a new contact [s]."""
 WATCHED_M = 1.0
-"""Separation beyond which no speeds are measured [m]; in one step bodies never approach that
-much."""
+"""Separation beyond which no speeds are measured [m]. Bodies never approach each other by that
+distance in one step."""
 NEAR_MISS_M, CLEAR_M = 0.05, 0.10
-"""Separations at which a near miss begins, and beyond which it ends without a touch [m], chosen by
-judgement."""
+"""Separations below which a near miss begins, and beyond which it ends if there was no touch [m].
+The values are estimates."""
 REACTION_S = 0.1
-"""Reaction time in the protective distance [s]; a typical value."""
+"""Reaction time in the computation of the protective distance [s]. It is a typical value."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
 WITHIN, BEYOND, NEVER = 1, 2, 3
-"""Severities: within the limit of the region, beyond it, and any contact with the head, which is
-never permitted."""
+"""Severities of a contact: within the limit of the region, beyond the limit, and contact with the
+head, which is never permitted."""
 _SIDED = {
     "shoulder": "back and shoulders",
     "upper_arm": "upper arm and elbow",
@@ -63,19 +65,20 @@ CAPSULE_REGIONS: dict[str, str] = {
     "pelvis": "pelvis",
     **{f"{side}_{part}": region for part, region in _SIDED.items() for side in ("left", "right")},
 }
-"""Region of the body of each capsule (`worker.body.Body.capsule_names`)."""
+"""Region of the body to which each capsule belongs, by the name of the capsule
+(`worker.body.Body.capsule_names`)."""
 REGION_NAMES = tuple(REGIONS)
 
 
 class WorkerHistory:
-    """History of one robot and worker in an episode."""
+    """History of contacts and near misses between one robot and one worker in an episode."""
 
     robot_m_s: float
     """Directed speed of the robot in the last step [m/s]."""
     since_s: float
-    """Time since their last touch [s]."""
+    """Time since the last touch of robot and worker [s]."""
     is_close: bool
-    """Whether they are as close as in a near miss."""
+    """Whether a near miss between robot and worker has begun and not yet ended."""
     contacts: Annotated[Ints, (len(KINDS),)]
     """Number of contacts of each kind in this episode."""
     near_misses: int
@@ -86,46 +89,47 @@ class Incident:
     """Events between one robot and one worker in a step."""
 
     separation_m: float
-    """Separation at the end of the step [m]; NaN beyond `WATCHED_M`, like the speeds."""
+    """Separation at the end of the step [m]. It is NaN, like the speeds, beyond `WATCHED_M`."""
     robot_m_s: float
-    """Directed speed of the robot [m/s]."""
+    """Directed speed of the robot in this step [m/s]."""
     worker_m_s: float
-    """Directed speed of the worker [m/s]."""
+    """Directed speed of the worker in this step [m/s]."""
     kind: int
-    """Kind of a contact that begins, as an index into `KINDS`; -1 if none begins."""
+    """Kind of the contact that begins in this step, as an index into `KINDS`; -1 if none begins."""
     region: int
-    """Region of the body that is touched, as an index into `REGION_NAMES`; -1 for none."""
+    """Region of the body that is touched, as an index into `REGION_NAMES`; -1 if none is
+    touched."""
     robot_speed_m_s: float
-    """Directed speed of the robot before a contact that begins [m/s]; NaN if none begins."""
+    """Directed speed of the robot before the contact that begins [m/s]; NaN if none begins."""
     closing_speed_m_s: float
-    """Closing speed of a contact that begins [m/s]; NaN if none begins."""
+    """Closing speed of the contact that begins [m/s]; NaN if none begins."""
     force_ratio: float
-    """Force of a contact that begins, divided by the permitted force; NaN if none begins."""
+    """Force of the contact that begins, divided by the permitted force; NaN if none begins."""
     severity: int
-    """`WITHIN`, `BEYOND` or `NEVER` for a contact that begins; 0 if none begins."""
+    """Severity `WITHIN`, `BEYOND` or `NEVER` of the contact that begins; 0 if none begins."""
     is_separation_violated: bool
     """Whether the robot moves towards the worker within the protective distance."""
     is_near_miss: bool
-    """Whether a near miss ends."""
+    """Whether a near miss ends in this step."""
 
 
 class Summary:
-    """Events of one environment's step over all workers; NaN for values that were not measured."""
+    """Events of one step of an environment, over all workers; NaN for values not measured."""
 
     robot_towards_m_s: float
-    """Directed speed of the robot towards the nearest worker [m/s]."""
+    """Speed of the robot towards the nearest worker [m/s]."""
     worker_towards_m_s: float
-    """Directed speed of the nearest worker towards the robot [m/s]."""
+    """Speed of the nearest worker towards the robot [m/s]."""
     separation_violated: float
     """1 if the robot moves towards any worker within the protective distance, else 0."""
     contact_robot_speed_m_s: float
-    """Greatest directed speed of the robot before a contact that begins [m/s]."""
+    """Maximum directed speed of the robot before a contact that begins [m/s]."""
     contact_closing_speed_m_s: float
-    """Greatest closing speed of a contact that begins [m/s]."""
+    """Maximum closing speed of a contact that begins [m/s]."""
     contact_force_ratio: float
-    """Greatest force of a contact that begins, divided by the permitted force."""
+    """Maximum force of a contact that begins, divided by the permitted force."""
     contact_severity: float
-    """Greatest severity of a contact that begins; 0 if none begins."""
+    """Maximum severity of a contact that begins; 0 if none begins."""
     contacts_towards: float
     """Number of contacts in the episode so far in which the robot moved towards the worker."""
     contacts_fleeing: float
@@ -149,7 +153,7 @@ NOT_ALWAYS_MEASURED = (
 
 @dataclass(frozen=True, slots=True)
 class Paths:
-    """Capsules of the bodies at the end of every physics step of a control step."""
+    """Capsules of robots and workers at the end of every physics step of a control step."""
 
     robot_world: Capsules
     """End points of the robot's capsules (B, T, K, 2, 3) [m]."""
@@ -166,7 +170,7 @@ class Paths:
 def measure_paths(
     robot_world: Capsules, robot_radius_m: Floats, workers_world: Capsules, worker_radius_m: Floats
 ) -> Paths:
-    """Return the paths of bodies together with their separations.
+    """Return the paths of robots and workers, together with their separations.
 
     Args:
         robot_world: (B, T, K, 2, 3) end points of the robot's capsules after every physics step
@@ -181,7 +185,7 @@ def measure_paths(
 
 
 def find_regions(capsule_names: Sequence[str]) -> Ints:
-    """Return the index into `REGION_NAMES` of each capsule of a body, (L,)."""
+    """Return the region (L,) of each capsule of a body, as an index into `REGION_NAMES`."""
     return np.array([REGION_NAMES.index(CAPSULE_REGIONS[name]) for name in capsule_names])
 
 
@@ -205,7 +209,7 @@ def detect_incidents(
     Args:
         history: (B, W) histories, advanced in place by one step.
         paths: capsules of the bodies at the physics steps.
-        regions: (L,) index into `REGION_NAMES` of each capsule of a body.
+        regions: (L,) region of each capsule of a body, as an index into `REGION_NAMES`.
         robot_kg: (B,) effective mass of the robot in a contact [kg].
         stop_s: (B,) time that the robot needs to stop [s].
         dt_s: duration of the step [s].
@@ -235,8 +239,8 @@ def detect_incidents(
 def _find_gaps(paths: Paths) -> Floats:
     """Return separations (3, B, W) [m]; NaN in environments where all bodies are far apart.
 
-    They are the separation at the end of the step, that with the robot at its initial pose, and
-    that with the workers at their initial poses.
+    The three rows are the separation at the end of the step, the separation with the robot at its
+    initial pose, and that with the workers at their initial poses.
     """
     at_end = paths.gaps_m[:, -1]
     gaps_m = np.full((3, *at_end.shape), np.nan)
@@ -251,7 +255,7 @@ def _find_gaps(paths: Paths) -> Floats:
 
 
 def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
-    """Return the index of the worker's capsule deepest inside the robot at physics step `t`."""
+    """Return the index of the worker's capsule that overlaps the robot most at physics step `t`."""
     capsules, radius_m = paths.workers_world[b, t, w], paths.worker_radius_m[b, w]
     gaps = least_separation(
         paths.robot_world[b : b + 1, t],
@@ -265,7 +269,10 @@ def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
 def _rate_contact(
     incidents: Records2[Incident], b: int, w: int, region: BodyRegion, robot_kg: float
 ) -> None:
-    """Write the force ratio and severity of a contact; for the head, the clamping limit applies."""
+    """Compute the force ratio and the severity of a contact.
+
+    For the head, the limit of a quasi-static contact applies.
+    """
     bears_n = region.transient_n or region.quasi_static_n
     force_n = contact_force(region.name, incidents["closing_speed_m_s"][b, w], robot_kg)
     incidents["force_ratio"][b, w] = force_n / bears_n
@@ -282,7 +289,7 @@ def _advance_history(
     took_s: float,
     dt_s: float,
 ) -> None:
-    """Write the incidents of a step except their regions, and advance the histories.
+    """Compute the incidents of a step except the touched regions, and advance the histories.
 
     Args:
         history: (B, W) histories, changed in place.
@@ -325,12 +332,12 @@ def _advance_history(
 
 @kernel
 def _replace_nan(value: float) -> float:
-    """Return a speed, or 0 if it is NaN: beyond `WATCHED_M`, from where no contact follows."""
+    """Return a speed, or 0 if it is NaN, because no contact follows from beyond `WATCHED_M`."""
     return value if value == value else 0.0
 
 
 def summarize(incidents: Records2[Incident], history: Records2[WorkerHistory]) -> Records1[Summary]:
-    """Return the summaries (B,) of incidents and histories (B, W)."""
+    """Return a summary for each environment (B,) of incidents and histories (B, W)."""
     summaries = make_records(Summary, len(incidents))
     _write_summaries(incidents, history, summaries)
     return summaries
@@ -342,7 +349,7 @@ def _write_summaries(
     history: Records2[WorkerHistory],
     summaries: Records1[Summary],
 ) -> None:
-    """Write the summaries of incidents and histories (B, W) to `summaries` (B,)."""
+    """Compute the `summaries` (B,) of incidents and histories (B, W)."""
     for b in range(len(incidents)):
         total, least = summaries[b], np.inf
         total.robot_towards_m_s = total.worker_towards_m_s = np.nan
@@ -380,7 +387,7 @@ def _find_greater(value: float, other: float) -> float:
 
 
 class IncidentMonitor(Stateful):
-    """Detector of incidents that keeps the history of each worker over the steps."""
+    """Detector of incidents, which stores the history of each worker over the steps."""
 
     CHANGES = ("history",)
 
@@ -392,7 +399,7 @@ class IncidentMonitor(Stateful):
         model: RobotModel,
         dt_s: float,
     ) -> None:
-        """Begin with empty histories.
+        """Create empty histories.
 
         Args:
             batch: number of environments.
@@ -410,7 +417,7 @@ class IncidentMonitor(Stateful):
         self.history[ids] = make_history(len(self.history[ids]), self.history.shape[1])
 
     def step(self, world: World, paths: Paths) -> Records2[Incident]:
-        """Return the incidents (B, W) of a step from the paths of the bodies."""
+        """Detect and return the incidents (B, W) of a control step."""
         hits_kg = np.full(len(self.history), self.model.mass_kg)
         if world.objects is not None:
             hits_kg += world.objects.held @ self.model.load_kg
@@ -418,5 +425,5 @@ class IncidentMonitor(Stateful):
         return detect_incidents(self.history, paths, self.regions, hits_kg, stop_s, self.dt_s)
 
     def find_stop_time(self, robot: RobotState) -> Floats:
-        """Return the stopping time (B,) of robots [s], with commands that change at the limit."""
+        """Return the stopping time (B,) of robots at their maximum deceleration [s]."""
         return (np.abs(robot.qd) / self.model.slew_rad_s2).max(axis=1)

@@ -1,11 +1,11 @@
 """Speed and separation monitoring: the required distance between robot and worker.
 
-ISO/TS 15066:2016, 5.5.4 (now in ISO 10218-2:2025), as cited by Marvel and Norcross 2017
-(PMC5117641) and Pupa et al. 2021 (arXiv:2103.01818); the approach speed of ISO 13855:2010. Verify
-against the standards before certification.
+The method is that of ISO/TS 15066:2016, 5.5.4 (now in ISO 10218-2:2025), as cited by Marvel and
+Norcross 2017 (PMC5117641) and Pupa et al. 2021 (arXiv:2103.01818); the approach speed is that of
+ISO 13855:2010. Verify both against the standards before certification.
 
-Speeds are *directed*: that of the robot's nearest point towards the worker, and that of the
-worker's nearest point towards the robot.
+Speeds are *directed*: they are the speed of the robot's nearest point towards the worker, and the
+speed of the worker's nearest point towards the robot.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def protective_distance(
     human_uncertainty_m: ArrayLike = 0.0,
     robot_uncertainty_m: ArrayLike = 0.0,
 ) -> Floats:
-    """Return the protective distance S_p, below which a robot must be stopping [m].
+    """Return the protective distance S_p, below which the robot must be stopping [m].
 
     S_p = S_h + S_r + S_s + C + Z_d + Z_r. All arguments are numbers or arrays, which are broadcast.
 

@@ -1,4 +1,4 @@
-"""Shields, which modify a command before the arm receives it; they read only the belief."""
+"""Shields, which modify a command before the arm receives it, based only on the belief."""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -23,12 +23,13 @@ Shield = Callable[
 """A function (belief, velocities, dt_s) -> (allowed, values) that may change a command.
 
 `velocities` and `allowed` (B, N) [rad/s] are the joint velocities of the agent and those that the
-arm receives, `dt_s` is the time until the next command [s]. `values` (B,) by name become
-"shield/NAME" in info. A shield has no state. After it, only the limits of joints are enforced
-(speed, acceleration, range); distances and contacts are not checked again.
+arm receives, `dt_s` is the time until the next command [s]. The `values` (B,), by name, are
+reported as "shield/NAME" in info. A shield has no state. After the shield, only the joint limits
+are enforced (speed, acceleration, range); distances and contacts are not checked again.
 """
 ShieldChoice = str | ShieldConfig | Mapping[str, Any] | Shield | None
-"""Values that `shield=` accepts: a name, settings or a mapping of them, a function, or None."""
+"""Values that the argument `shield` accepts: a name, settings or a mapping of them, a function, or
+None."""
 MEASURED = ("change", "active", "scale")
 """Names of the values that are measured for every shield."""
 ACTIVE_RAD_S = 0.02
@@ -37,11 +38,11 @@ ACTIVE_RAD_S = 0.02
 SHIELDS: Registry[Shield] = Registry(
     "shield", {name: partial(limit_command, config=config) for name, config in PRESETS.items()}
 )
-"""Built-in shields and those that users registered, by name."""
+"""Built-in shields and shields that users have registered, by name."""
 
 
 def find_shield(shield: ShieldChoice) -> Shield | None:
-    """Return the shield for a name, settings or a function; None stays None.
+    """Return the shield for a name, settings or a function; for None, return None.
 
     Raises:
         ConfigError: no shield has this name, a setting is invalid, or the function has other
@@ -66,22 +67,23 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
 
 
 def check_shield(description: str, shield: Callable[..., Any]) -> None:
-    """Raise `ConfigError` for a function whose parameters are not those of a shield."""
+    """Raise `ConfigError` if the parameters of a function are not those of a shield."""
     check_arguments(description, shield, "belief", "velocities", "dt_s")
 
 
 def apply_shield(
     shield: Shield | None, belief: Belief, command: JointVelocities, dt_s: float
 ) -> ShieldOutput:
-    """Apply a shield to a command; its values are named as in info.
+    """Apply a shield to a command, and return the velocities and the values for info.
 
-    In addition to the values of the shield itself, every shield has
+    In addition to the values that the shield returns, the following values are measured:
 
-    - "shield/change": norm of the change [rad/s], for slides [m/s];
-    - "shield/active": 1 if that exceeds `ACTIVE_RAD_S`;
-    - "shield/scale": share of the command that is left along its own direction, 1 for all of it.
+    - "shield/change": norm of the change of the command [rad/s; m/s for prismatic joints];
+    - "shield/active": 1 if the change exceeds `ACTIVE_RAD_S`, otherwise 0;
+    - "shield/scale": fraction of the command that remains along its direction; 1 if it is
+      unchanged.
 
-    Without a shield the command reaches the arm unchanged, and there are no values.
+    Without a shield, the command is returned unchanged and there are no values.
 
     Args:
         shield: the shield, or None.
@@ -137,7 +139,7 @@ def _check_values(values: Mapping[Any, Any], batch: int) -> dict[str, Floats]:
 
 
 def _warn_of_speed(allowed: JointVelocities, limit_rad_s: Floats) -> None:
-    """Warn about a shield that allows more than the velocity limits of the joints."""
+    """Warn if a shield allows velocities above the limits of the joints."""
     over = np.abs(allowed).max(0, initial=0.0) / limit_rad_s
     if (over > 1.0 + 1e-9).any():
         joint = int(over.argmax())

@@ -1,10 +1,10 @@
-"""Solver for the joint velocities nearest to wanted ones, with soft constraints in a hard box.
+"""Solver for the joint velocities nearest to given ones, under soft constraints and box limits.
 
     minimise |x - wanted|^2 + sum_r w_r max(J_r x - b_r, 0)^2,   low <= x <= high
 
-The problem always has exactly one solution, that of the QP with a slack for each constraint. The
-objective is piecewise quadratic: Newton steps projected on the box (Bertsekas 1982, DOI
-10.1137/0320018) reach the solution in a finite number of iterations.
+The problem always has exactly one solution, which is that of the quadratic program with a slack
+variable for each constraint. The objective is piecewise quadratic: Newton steps projected on the
+box (Bertsekas 1982, DOI 10.1137/0320018) reach the solution in a finite number of iterations.
 """
 
 import math
@@ -20,7 +20,7 @@ TOLERANCE_RAD_S = 1e-9
 
 
 class Problem(NamedTuple):
-    """The problem that `solve` solves, for one robot."""
+    """The optimization problem of one robot."""
 
     J: Floats
     """Rows of the constraints (M, N)."""
@@ -29,9 +29,9 @@ class Problem(NamedTuple):
     weight: Floats
     """Weights of squared violations relative to squared changes of joint velocities (M,)."""
     low: JointVelocities
-    """Least joint velocities (N,) [rad/s]."""
+    """Lower bounds on the joint velocities (N,) [rad/s]."""
     high: JointVelocities
-    """Greatest joint velocities (N,) [rad/s]."""
+    """Upper bounds on the joint velocities (N,) [rad/s]."""
     wanted: JointVelocities
     """Joint velocities of the agent (N,) [rad/s]."""
 
@@ -105,7 +105,7 @@ def constraint_violation(row: Floats, bound: float, x: Floats) -> float:
 
 @kernel
 def expand_objective(problem: Problem, x: Floats, g: Floats, H: Floats) -> None:
-    """Write the gradient `g` (N,) and the Hessian `H` (N, N) of half the objective at `x` (N,)."""
+    """Compute the gradient `g` (N,) and Hessian `H` (N, N) of half the objective at `x` (N,)."""
     n = len(x)
     for i in range(n):
         g[i] = x[i] - problem.wanted[i]
@@ -123,7 +123,10 @@ def expand_objective(problem: Problem, x: Floats, g: Floats, H: Floats) -> None:
 
 @kernel
 def solve_newton_step(H: Floats, g: Floats, d: Floats) -> None:
-    """Write -H^-1 g to `d` (N,); the Cholesky factor replaces the lower triangle of `H` (N, N)."""
+    """Compute the Newton step `d` = -H^-1 g (N,).
+
+    The Cholesky factor replaces the lower triangle of `H` (N, N).
+    """
     n = len(g)
     for i in range(n):
         for j in range(i + 1):

@@ -1,4 +1,4 @@
-"""Speed limits for undetected people: lost workers, hidden hands, and floor not seen empty."""
+"""Speed limits due to undetected people: lost workers, hidden hands and unobserved floor."""
 
 from dataclasses import dataclass, replace
 
@@ -13,16 +13,18 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.safety.config import ShieldConfig
 
 NEAR_M, FAR_M = 0.25, 1.0
-"""Distances from a lost worker's last position at which a robot stands and begins to slow down
-[m]."""
+"""Distances from a lost worker's last position below which a robot stops and slows down,
+respectively [m]."""
 UNLOCATED_M = 0.135
-"""Standard deviation above which a wrist counts as hidden, if exceeded along two axes [m]; growth
-by prediction is added to it. A wrist that a camera detects is uncertain in depth only."""
+"""Standard deviation that a hidden wrist exceeds along two axes [m]; the growth by prediction is
+added to it. A wrist that a single camera detects is uncertain only in depth, that is along one
+axis."""
 VAGUE_M = 0.25
-"""Standard deviation of a shoulder above which hands count as hidden, too, if exceeded along any
-axis [m]; growth by prediction is added to it."""
+"""Standard deviation of a shoulder above which the hands count as hidden as well, if it is exceeded
+along any axis [m]; the growth by prediction is added to it."""
 HAND_M = 0.6
-"""Distance beyond unseen floor within which the hands of people there may be unseen as well [m]."""
+"""Distance from unobserved floor within which the hands of people there may also be undetected
+[m]."""
 ARM_M = 0.75
 """Length of an outstretched arm, from the shoulder to the tip of the hand [m]."""
 WRISTS, SHOULDERS = (
@@ -32,16 +34,16 @@ WRISTS, SHOULDERS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Undetected:
-    """Consequences of people who are not detected at present."""
+    """Restrictions on the robots due to people that are not detected at present."""
 
     is_lost: Bools
     """Mask of the workers that were detected once, but not recently (B, W)."""
     speed_limit_m_s: Floats
-    """Speed limit of every point of a robot (B,) [m/s]; infinite for none."""
+    """Speed limit of every point of a robot (B,) [m/s]; infinite if there is no limit."""
 
 
 def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
-    """Return the lost workers, and the speed limit due to people who are not detected."""
+    """Return the lost workers, and the speed limit due to people that are not detected."""
     estimate = belief.estimate
     lately = estimate.tracked & (estimate.unobserved_s <= config.stale_after_s)
     lost = ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
@@ -55,7 +57,7 @@ def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
 
 
 def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Floats:
-    """Return the speed limit (B,) by the distance from the last positions of lost workers [m/s]."""
+    """Return the speed limit (B,) near the last positions of lost workers [m/s]."""
     there = replace(belief.estimate, mean_world=belief.estimate.seen_world, tracked=lost)
     near_m = estimated_separation(belief.robot, there).distance_m.min(1)
     share = np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
@@ -63,11 +65,10 @@ def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Float
 
 
 def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
-    """Return the speed limit (B,) near floor that a single camera has seen empty [m/s].
+    """Return the speed limit (B,) near floor that one camera has observed to be empty [m/s].
 
-    It is 0 before the first image.
-
-    `constraints.add_floor_constraints` keeps the distance from floor that no camera has seen.
+    The limit is 0 before the first image. `constraints.add_floor_constraints` maintains the
+    distance from floor that no camera has observed.
     """
     if belief.unseen is None:
         return np.where(never_seen.any(1), 0.0, np.inf)
@@ -76,9 +77,9 @@ def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -
 
 
 def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
-    """Return the speed limit (B,) for hidden hands of tracked workers [m/s].
+    """Return the speed limit (B,) due to hidden hands of tracked workers [m/s].
 
-    A hidden hand may be anywhere within an arm's length of its shoulder, in any direction.
+    A hidden hand is assumed to be anywhere within an arm's length of its shoulder.
     """
     estimate, limit = belief.estimate, np.full(len(belief.estimate.tracked), np.inf)
     cov = estimate.cov_world[:, :, WRISTS]
@@ -98,7 +99,7 @@ def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
 
 
 def _is_vague(estimate: PoseEstimate, config: ShieldConfig) -> Bools:
-    """Return a mask (B, W) of tracked workers with a shoulder that is uncertain along some axis."""
+    """Return a mask (B, W) of tracked workers with a shoulder that is uncertain along any axis."""
     cov = estimate.cov_world[:, :, SHOULDERS]
     most_m = VAGUE_M + config.prediction_growth_m_s * estimate.age_s[:, :, SHOULDERS]
     vague = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > most_m**2)

@@ -1,4 +1,4 @@
-"""Construction of a compiled scene from settings: room, robot, workers and cameras."""
+"""Compilation of a scene with room, robot, workers and cameras from its settings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,8 +41,8 @@ from hrc_env.worker.props import held_shapes
 from hrc_env.world import NOTHING, Grounds, TaskScene
 
 ARENA_BYTES = 2**20
-"""Memory for the contacts of one simulation [bytes], ten times that of an arm in a pile of
-workers."""
+"""Memory for the contacts of one simulation [bytes]: ten times the memory for an arm in contact
+with many overlapping workers."""
 PAIR_BYTES = 1280
 """Memory per squared number of workers [bytes], of which MuJoCo needs about 990."""
 HARD = {"solimp": [0.95, 0.99, 0.001, 0.5, 2.0]}
@@ -53,7 +53,7 @@ GRIPPING = {"condim": 4, "friction": [1, 1, 0.02, 0.0005, 0.0005], "solref": [0.
 LYING = {"condim": 3, "friction": [0.6, 0.6, 0.005, 0.0001, 0.0001], "solref": [0.01, 1.0], **HARD}
 """Contact parameters of wood."""
 THROWN_M = 1.5
-"""Distance beyond the robot's reach within which contacts of loose objects with fixed ones are
+"""Distance beyond the robot's reach up to which contacts between loose and fixed objects are
 computed [m]."""
 
 
@@ -71,8 +71,8 @@ class SceneConfig:
     """Limit on the rate of change of a commanded joint velocity [rad/s^2]; the default keeps the
     overshoot below 5 %."""
     integrator_clamp_rad: float = 0.05
-    """Limit on the difference between the holding servo's angle and that of a blocked joint
-    [rad]."""
+    """Limit on the difference between the target angle of the holding servo and the angle of a
+    blocked joint [rad]."""
     cameras: tuple[CameraConfig, ...] = ()
     """All cameras of the scene, from which `build` may select some; empty for the four default
     cameras of the scene."""
@@ -82,7 +82,7 @@ class SceneConfig:
 
 
 class Recipe(NamedTuple):
-    """Arguments of `build` from which a scene is made, in order."""
+    """Arguments of `build` for a scene, in the order of its parameters."""
 
     config: SceneConfig
     """Settings of the scene."""
@@ -95,7 +95,7 @@ class Recipe(NamedTuple):
     cameras: tuple[str, ...]
     """Names of the cameras in use."""
     robot: Robot
-    """The robot."""
+    """Robot in the scene."""
     task_scene: TaskScene
     """The task's part of the scene."""
 
@@ -109,18 +109,19 @@ class Scene:
     name: str
     """Name of the scene, a key of `SCENES`."""
     n_workers: int
-    """Number W of workers in the model."""
+    """Number of workers in the model, W."""
     robot: Robot
-    """The robot."""
+    """Robot in the scene."""
     bodies: tuple[str, ...]
-    """Bodies that the workers can have; `model` contains the capsules of the first one."""
+    """Names of the bodies that the workers can have; `model` contains the capsules of the first
+    body."""
     model: mujoco.MjModel
-    """Model for the physics, with moving, colliding and occluding geoms; `drawing_model` also
-    contains the visual ones."""
+    """MuJoCo model for the physics, with moving, colliding and occluding geoms; `drawing_model`
+    also contains visual geoms."""
     chain: SerialChain
     """Kinematics and capsules of the robot."""
     cameras: tuple[PinholeCamera, ...]
-    """Cameras in use."""
+    """Pinhole cameras in use."""
     home_q: JointAngles
     """(N,) home pose of the robot [rad]."""
     servo_lead_s: Floats
@@ -129,9 +130,9 @@ class Scene:
     watched_capsules: Ints
     """Indices of the robot's capsules that workers watch."""
     worker_mocap: Ints
-    """(W, S) mocap index of every body segment of every worker."""
+    """(W, S) mocap index of each body segment of each worker."""
     worker_capsules: Ints
-    """(W, K) geom index of every capsule of every worker."""
+    """(W, K) geom index of each capsule of each worker."""
     obstacles: Floats
     """(G, `shapes.WIDTH`) fixed shapes that occlude."""
     grounds: Grounds
@@ -139,7 +140,7 @@ class Scene:
     map: Grounds
     """Floor plan that mobile bases know, in which the pedestal and the loads are also obstacles."""
     objects: Objects
-    """Loose objects."""
+    """Loose objects of the task."""
     grip: Grip | None
     """The robot's fingers; None for a robot without fingers."""
     cups: Cups | None
@@ -221,7 +222,7 @@ def all_grounds(config: SceneConfig | None = None) -> dict[str, Grounds]:
 
 @lru_cache(maxsize=8)
 def _build(recipe: Recipe) -> Scene:
-    """Compile the scene of a recipe."""
+    """Compile the scene that a recipe describes."""
     robot, n_workers = recipe.robot, recipe.n_workers
     chain = make_chain(robot, _foot_world(robot, recipe.name))
     spec = _make_spec(recipe)
@@ -262,7 +263,7 @@ def _build(recipe: Recipe) -> Scene:
 
 
 def with_rig(scene: Scene, rig: tuple[CameraConfig, ...]) -> Scene:
-    """Return a scene with another rig and all of its cameras in use; the physics is shared."""
+    """Return a scene with another rig, with all of its cameras in use; the physics is shared."""
     config = replace(scene.config, cameras=rig)
     return replace(scene, config=config, cameras=make_cameras(select(rig)))
 
@@ -294,7 +295,7 @@ def find_visuals(scene: Scene) -> WorkerVisuals:
 
 
 def _make_spec(recipe: Recipe) -> mujoco.MjSpec:
-    """Return the specification of a scene without the workers' visual geoms and props."""
+    """Return the MuJoCo specification of a scene without visual geoms and props of workers."""
     config, robot, n_workers = recipe.config, recipe.robot, recipe.n_workers
     path = assets_dir() / "scenes" / f"{recipe.name}{'' if config.clutter else '_bare'}.xml"
     spec = mujoco.MjSpec.from_file(str(path))
@@ -376,7 +377,10 @@ def _add_contact_pairs(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) ->
 
 
 def _nearest_m(geom: mujoco.MjsGeom, foot_world: Floats) -> float:
-    """Return a lower bound on the distance of a geom from the robot's base [m]; 0 if it moves."""
+    """Return a lower bound on the distance of a geom from the robot's base [m].
+
+    For a geom that moves, it is 0.
+    """
     if geom.parent.name != "world":
         return 0.0
     turn = np.zeros(9)

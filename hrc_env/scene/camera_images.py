@@ -38,8 +38,7 @@ SMALL_PX = 128
 COARSE = {"numslices": 8, "numstacks": 2}
 """MuJoCo's visual quality settings for round geoms in small images."""
 TOO_THIN = 0.2
-"""Thickness of moving discs below which they are not rendered, as a fraction of a rendered
-pixel."""
+"""Apparent thickness of moving discs below which they are not rendered [rendered pixels]."""
 KEPT_BYTES = 2**28
 """Memory for stored images of static geoms [bytes]."""
 
@@ -49,7 +48,7 @@ KEPT_BYTES = 2**28
 class ImageConfig:
     """Settings of the camera images that an observation also contains (`observe_images`).
 
-    Each image is the present view of a camera of the rig, with its lens and the episode's
+    Each image is the current view of a camera of the rig, with its lens and the episode's
     appearance, but without faults, delays and shadows. It is the camera's whole image, scaled to
     `height` x `width`; it is black if the camera is not in the episode's rig. A mapping of these
     fields or a tuple (height, width) is also accepted.
@@ -108,11 +107,11 @@ class _Backdrop:
     look: Look | None
     """Appearance with which the image was rendered."""
     rgb: Image
-    """Colours as rendered, bottom row first."""
+    """Colours at the rendered size, bottom row first."""
     z: NDArray[np.float32]
-    """Depths as rendered, from 1 (near) to 0 (far), bottom row first."""
+    """Depths at the rendered size, from 1 (near) to 0 (far), bottom row first."""
     mean: Image
-    """Colours at the final size, top row first."""
+    """Averaged colours at the final size, top row first."""
 
 
 class Layer(NamedTuple):
@@ -125,7 +124,7 @@ class Layer(NamedTuple):
 
 
 class CameraImages(Canvas):
-    """Renderer of whole images (height, width, 3) of pinhole cameras, and square windows of them.
+    """Renderer of whole images (height, width, 3) of pinhole cameras, and of square image windows.
 
     Environments with the same appearance share the stored images of static geoms.
     """
@@ -168,7 +167,7 @@ class CameraImages(Canvas):
         return np.flatnonzero(moving & discs & thin & looks)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose the moving geoms like `Canvas`, but treat props on the floor as static."""
+        """Pose the moving geoms like `Canvas.pose`, but treat props on the floor as static."""
         super().pose(q, motion)
         if motion is None or not self._visuals.props.size:
             return
@@ -182,7 +181,7 @@ class CameraImages(Canvas):
         self._model.geom_group[self._lying] = HIDDEN
 
     def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the part of the scene for the next pictures, like `Canvas`, with static props."""
+        """Choose the part of the scene for the next pictures; props on the floor are static."""
         is_fresh = part in self._fresh
         super().show(part, shadows)
         if part is not MOVING and not is_fresh and len(self._lying):
@@ -246,7 +245,7 @@ class CameraImages(Canvas):
         return image
 
     def _remember(self, key: Hashable, behind: _Backdrop) -> None:
-        """Store an image of the static geoms as the latest, and delete the oldest if needed."""
+        """Store an image of the static geoms, and delete the oldest images beyond `KEPT_BYTES`."""
         self._backdrops.pop(key, None)
         self._backdrops[key] = behind
         most = max(KEPT_BYTES // (behind.rgb.nbytes + behind.z.nbytes), len(self.scene.cameras))

@@ -1,4 +1,4 @@
-"""An OpenGL context for a scene that is posed, viewed by a camera and rendered.
+"""Renderer of a posed scene from a camera, with a separate OpenGL context.
 
 The context is made when the first picture is rendered, and is current only during rendering:
 threads may take turns, and several canvases never interfere with each other.
@@ -56,20 +56,20 @@ class Part:
 
 
 EVERYTHING = Part(mujoco.mjtCatBit.mjCAT_ALL, True)
-"""The whole scene."""
+"""Part that comprises the whole scene."""
 STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
-"""The static geoms."""
+"""Part that comprises the static geoms."""
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
-"""The moving geoms."""
+"""Part that comprises the moving geoms."""
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
-"""The static geoms, with lights that cast shadows switched off."""
+"""Part that comprises the static geoms, with lights that cast shadows switched off."""
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
-"""The moving geoms, with lights that cast shadows switched off."""
+"""Part that comprises the moving geoms, with lights that cast shadows switched off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:
-    """Capsules in a picture that are not part of the scene; those of length 0 are spheres."""
+    """Capsules to show in a picture in addition to the scene; a capsule of length 0 is a sphere."""
 
     ends_world: Capsules
     """(N, 2, 3) end points of the capsules' axes [m]."""
@@ -80,7 +80,7 @@ class Marks:
 
 
 class Spheres(NamedTuple):
-    """Spheres in the world."""
+    """Centres and radii of spheres in the world frame."""
 
     centre_world: Points3
     """(N, 3) centres [m]."""
@@ -89,7 +89,7 @@ class Spheres(NamedTuple):
 
 
 class Canvas:
-    """A renderer of a scene with pictures of a fixed size.
+    """Renderer of pictures of a scene, with a fixed size.
 
     Args:
         scene: the scene.
@@ -125,7 +125,7 @@ class Canvas:
         self.groups(ALL_GROUPS)
 
     def randomize(self, look: Look | None) -> None:
-        """Render with an appearance from the next pose on; None for the scene as built."""
+        """Set the appearance from the next pose on; None for the scene as built."""
         if look is self._look:
             return
         self._look = look
@@ -157,7 +157,7 @@ class Canvas:
         self._fresh.clear()
 
     def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the part of the scene that the next pictures show, in the present pose."""
+        """Choose the part of the scene that the next pictures show, in the current pose."""
         self._open()
         if part not in self._lists:
             self._lists[part] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
@@ -260,7 +260,10 @@ class Canvas:
         return np.stack([right, np.cross(along, right), along], -1)
 
     def find_moving_spheres(self) -> Spheres:
-        """Return bounding spheres of moving geoms; those of the capsules cover the skins."""
+        """Return bounding spheres of moving geoms.
+
+        A skin is covered by the spheres of its capsules.
+        """
         model, bodies = self._model, self._model.geom_bodyid
         moving = (model.body_weldid[bodies] != 0) | (model.body_mocapid[bodies] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
@@ -297,13 +300,13 @@ class Canvas:
         return self.distance_m(z[::-1])
 
     def distance_m(self, z: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Convert depths from `read` to distances along the optical axis [m]."""
+        """Convert depths that `read` returned to distances along the optical axis [m]."""
         eye = self._shown.camera[0]
         near, far = float(eye.frustum_near), float(eye.frustum_far)
         return (near * far / (near + z.astype(float) * (far - near))).astype(np.float32)
 
     def close(self) -> None:
-        """Free the context, after which the canvas cannot be used; a second call has no effect."""
+        """Free the context; the canvas cannot be used afterwards. A second call has no effect."""
         if self._drawing is not None:
             self._drawing.free()
         self._drawing = self._shown = None
@@ -317,7 +320,7 @@ class Canvas:
             return
 
     def _take_over_textures(self) -> None:
-        """Copy the assignment of textures to materials to the context, which keeps its own copy."""
+        """Copy the assignment of textures to materials into the context."""
         if self._drawing is not None:
             textures = self._model.mat_texid.ravel()
             self._drawing.looks.mat_texid[: len(textures)] = textures

@@ -1,4 +1,4 @@
-"""Fitting of capsules to a shape that is given by points on its surface.
+"""Fitting of capsules to a shape, given points on its surface.
 
 A sphere protrudes from a shape by its radius minus the depth of its centre. Therefore, a grid of
 depths determines the maximum radius of a capsule along any line. From the capsules along many
@@ -17,9 +17,9 @@ TRIES = ((0.02, 7), (0.025, 7), (0.025, 14), (0.04, 14), (0.08, 14))
 """Protrusion of capsules from the shape [m] and maximum number of capsules for each attempt, in
 order; the first attempt that covers enough of the surface is used."""
 UNCOVERED_M = 0.005
-"""Distance of a surface point from the nearest capsule below which it is covered [m]."""
+"""Maximum distance of a covered surface point from the nearest capsule [m]."""
 LEFT_M = 0.015
-"""Maximum distance of the surface from the nearest capsule for a successful attempt [m]."""
+"""Maximum distance of a surface point from the nearest capsule for a successful attempt [m]."""
 LEAST_RADIUS_M = 0.01
 """Minimum radius of a capsule [m]."""
 CELL_M = 0.01
@@ -28,7 +28,7 @@ WALLS = 5
 """Number of axis directions, out of six, in which a ray from an inner cell must meet the surface.
 With this number, an open-ended tube has inner cells, and the corner of an L has none."""
 LINES = 8000
-"""Number of random lines for capsules."""
+"""Number of random lines along which capsules are fitted."""
 MIDDLES = 1000
 """Number of points that the random lines connect."""
 COUNTED = 1000
@@ -44,7 +44,7 @@ SPHERE = np.stack(
 
 
 class Rod(NamedTuple):
-    """A capsule in the frame of the surface points."""
+    """Capsule in the frame of the surface points."""
 
     start_m: Points3
     """(3,) first end of the capsule's axis [m]."""
@@ -55,7 +55,7 @@ class Rod(NamedTuple):
 
 
 class _Depths(NamedTuple):
-    """Grid of depths below the surface of a shape."""
+    """Regular grid of depths below the surface of a shape."""
 
     low_m: Points3
     """(3,) centre of the first cell [m]."""
@@ -112,7 +112,7 @@ def _measure_depths(points_m: Points3) -> _Depths:
 
 
 def _draw_lines(depths: _Depths, out_m: float, rng: np.random.Generator) -> list[Rod]:
-    """Return the thickest capsules along random lines that protrude by `out_m` [m]."""
+    """Return the thickest capsules along random lines that protrude by at most `out_m` [m]."""
     middles = depths.middles()[depths.depth_m + out_m > LEAST_RADIUS_M]
     middles = middles[rng.permutation(len(middles))[:MIDDLES]]
     start, end = middles[rng.integers(len(middles), size=(2, LINES))]
@@ -135,7 +135,7 @@ def _cover(points_m: Points3, lines: list[Rod], most: int) -> list[Rod]:
 
 
 def _shrink(points_m: Points3, rods: list[Rod]) -> list[Rod]:
-    """Reduce the radii of capsules as far as they still cover all points (N, 3)."""
+    """Reduce the radii of capsules as far as they continue to cover all points (N, 3)."""
     rods = list(rods)
     for k, rod in enumerate(rods):
         uncovered = points_m[_outside_all_m(points_m, rods[:k] + rods[k + 1 :]) > UNCOVERED_M]

@@ -1,4 +1,4 @@
-"""Suction cups, which hold an object from contact until they are vented or it is torn off."""
+"""Suction cups, which hold an object from contact until they are vented or overloaded."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 CUPS = "cups_"
 """Prefix of the name of a weld between cups and an object, followed by the object's name."""
 SEAL_M = 0.004
-"""Distance of the cups from their target on an object's face below which they seal [m]."""
+"""Maximum distance of sealing cups from their target on an object's face [m]."""
 SEAL_RAD = 0.03
-"""Angle between the cups and an object's face below which they seal [rad]."""
+"""Maximum angle between sealing cups and an object's face [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cups:
-    """The suction cups of an arm, and the C objects that they can hold."""
+    """Suction cups of an arm, and the C objects that they can hold."""
 
     objects: Ints
     """(C,) index of each object in `Objects`."""

@@ -1,7 +1,7 @@
-"""Visual domain randomization of light, colours, hats and litter, drawn for every episode.
+"""Visual domain randomization of light, colours, hats and litter for every episode.
 
-It changes only images: positions, occlusion, the workers' motion, goals and faults are the same as
-without it for the same seed, because it is drawn from a separate random stream.
+The randomization uses a separate random stream and changes only images: for the same seed,
+positions, occlusion, the workers' motion, goals and faults are the same as without it.
 """
 
 from collections.abc import Mapping
@@ -37,10 +37,10 @@ from 0."""
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class AppearanceConfig:
-    """Ranges of the visual domain randomization; with the defaults nothing is randomized."""
+    """Ranges of the visual domain randomization. The defaults randomize nothing."""
 
     RENAMED: ClassVar[Mapping[str, str]] = {"plain": "untextured"}
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     light: tuple[float, float] = (1.0, 1.0)
     """Minimum and maximum of the factor on the brightness of all light."""
@@ -49,7 +49,8 @@ class AppearanceConfig:
     light_tilt_deg: float = 0.0
     """Largest tilt of the directions of lamps and sun [deg]."""
     warmth: float = 0.0
-    """Largest fraction by which light is redder and less blue, or less red and bluer."""
+    """Largest fraction by which the red channel of the light is increased and the blue channel
+    decreased, or vice versa."""
     untextured: float = 0.0
     """Fraction of the scene's textured surfaces that lose their texture (wood, concrete,
     plaster)."""
@@ -95,7 +96,7 @@ VARIED = AppearanceConfig(
     hat=0.6,
     litter=25,
 )
-"""Randomization of all properties, within ranges that were judged to be plausible."""
+"""Randomization of all properties, within ranges that are estimated to be plausible."""
 APPEARANCES: dict[str, AppearanceConfig] = {
     "as_built": AS_BUILT,
     "varied": VARIED,
@@ -109,14 +110,14 @@ APPEARANCES: dict[str, AppearanceConfig] = {
 
 
 class Look(NamedTuple):
-    """The appearance drawn for one episode."""
+    """Appearance that was sampled for an episode."""
 
     light: float
     """Factor on the brightness of all light."""
     turn_rad: float
     """Rotation of the light's directions about the vertical [rad]."""
     tilt_rad: float
-    """Tilt of the light's directions about the horizontal direction `tilt_about_rad` [rad]."""
+    """Tilt of the light's directions about the horizontal axis at `tilt_about_rad` [rad]."""
     tilt_about_rad: float
     """Angle of the tilt's axis from world +x [rad]."""
     light_rgb: Floats
@@ -138,7 +139,7 @@ class Look(NamedTuple):
 
 
 def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator) -> Look:
-    """Draw the appearance of an episode.
+    """Sample the appearance of an episode.
 
     Args:
         config: ranges of the randomization.
@@ -167,7 +168,7 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
 def randomize(
     model: mujoco.MjModel, built: mujoco.MjModel, visuals: WorkerVisuals, look: Look
 ) -> None:
-    """Apply an appearance to a drawing model.
+    """Apply a sampled appearance to a drawing model.
 
     Args:
         model: drawing model of the caller, which is changed.
@@ -193,7 +194,7 @@ def restore(model: mujoco.MjModel, built: mujoco.MjModel) -> None:
 
 
 def hide_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
-    """Hide the hats of workers without a hat in this episode; call it after `show_bodies`."""
+    """Hide hats according to `Look.has_hat`; call this function after `show_bodies`."""
     bare = visuals.hats[look.has_hat[visuals.hats[:, 0]] == 0.0, 2]
     model.geom_group[bare] = HIDDEN
 

@@ -1,4 +1,4 @@
-"""Access to OpenGL: selection of a backend, contexts, and errors if it is unavailable.
+"""Access to OpenGL: selection of a backend, contexts, and errors if OpenGL is unavailable.
 
 mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux renders by EGL if its
 library is installed (no display is needed), otherwise by OSMesa, or else in a hidden window. A
@@ -36,11 +36,11 @@ WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that disable rendering."""
 VARIABLES = ("PYOPENGL_PLATFORM", "MUJOCO_EGL_DEVICE_ID", "CUDA_VISIBLE_DEVICES", "EGL_PLATFORM")
-"""Further environment variables that affect whether a context can be made."""
+"""Names of further environment variables that affect whether a context can be made."""
 EXIT_PATIENCE_S = 2.0
-"""Maximum time for which the end of the process waits for another thread's rendering [s]."""
+"""Maximum time for which the process waits at exit for rendering in another thread [s]."""
 _MAKING = threading.Lock()
-"""Lock that lets only one thread at a time make a context."""
+"""Lock that allows only one thread at a time to make a context."""
 _OPEN: weakref.WeakSet["Drawing"] = weakref.WeakSet()
 """Contexts that have not been freed."""
 
@@ -49,7 +49,7 @@ class Drawing:
     """An OpenGL context with a model's textures and meshes, which one thread at a time may use."""
 
     def __init__(self, context: Any, looks: "mujoco.MjrContext") -> None:
-        """Wrap a context.
+        """Wrap an OpenGL context.
 
         Args:
             context: context of one of mujoco's classes.
@@ -72,7 +72,7 @@ class Drawing:
                 restore()
 
     def free(self) -> None:
-        """Free the context, after which it cannot be used; a second call has no effect."""
+        """Free the context; it cannot be used afterwards. A second call has no effect."""
         with self._lock:
             if not self._freed:
                 with self.current():
@@ -81,7 +81,7 @@ class Drawing:
                 self._freed = True
 
     def free_at_exit(self) -> None:
-        """Free the context and keep its lock, so that no other thread can use it."""
+        """Free the context, and keep its lock to prevent use by other threads."""
         if self._lock.acquire(timeout=EXIT_PATIENCE_S):
             self.free()
 
@@ -112,7 +112,7 @@ def choose_backend() -> str:
 
 
 def draw_on_one_thread() -> None:
-    """Let Mesa's software OpenGL render in the calling thread, unless LP_NUM_THREADS is set.
+    """Make Mesa's software OpenGL render in the calling thread, unless LP_NUM_THREADS is set.
 
     Mesa's rendering threads, one per core, would compete with the thread of the detector.
     """
@@ -147,16 +147,16 @@ def require_display() -> None:
 
 
 class GlStatus(NamedTuple):
-    """State of OpenGL on this machine."""
+    """Availability of OpenGL on this machine."""
 
     works: bool
     """Whether pixels can be rendered."""
     message: str
-    """Sentence about the backend, or about the error and its remedy."""
+    """Description of the backend, or of the error and its remedy, in one sentence."""
 
 
 def gl_status() -> GlStatus:
-    """Render a test picture, and return the state of OpenGL."""
+    """Render a test picture, and return whether OpenGL is available."""
     import mujoco
 
     try:

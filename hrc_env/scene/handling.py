@@ -1,4 +1,4 @@
-"""State and measurement of the task's loose objects, and the loads that robots carry.
+"""State and measurement of a task's loose objects, and loads that robots carry.
 
 Objects are not tracked by cameras; the robot measures their true poses with noise.
 """
@@ -33,10 +33,10 @@ class ObjectsConfig:
 
 
 class LoadedRobot(NamedTuple):
-    """Robots, including the objects that they carry."""
+    """States and paths of robots, including the objects that they carry."""
 
     world: World
-    """The world, in which the capsules of carried objects belong to the robot."""
+    """True state, in which the capsules of carried objects belong to the robot."""
     path_world: Capsules
     """(B, T, K, 2, 3) capsules of robot and carried objects after every substep [m]."""
 
@@ -56,14 +56,14 @@ def make_world(physics: Physics, ids: Ints, robot: RobotState) -> World:
 def attach_load(
     scene: Scene, world: World, path_world: Capsules, q_path: Floats, is_load: Bools | bool = True
 ) -> LoadedRobot:
-    """Return the robots, with the objects that they carry as parts of the robots.
+    """Return the states and paths of robots with carried objects as parts of the robots.
 
     Args:
         scene: the scene.
         world: state of the B robots and their objects.
         path_world: (B, T, K, 2, 3) capsules of the robots after every substep [m].
         q_path: (B, T, nq) `qpos` after every substep.
-        is_load: (B, O) whether each object counts as part of the robot while it is held.
+        is_load: mask (B, O) of the objects that count as part of the robot while they are held.
     """
     if world.objects is None:
         return LoadedRobot(world, path_world)

@@ -1,4 +1,4 @@
-"""Properties of a scene's robot: limits of commands, effective mass, and objects to reach."""
+"""Properties of a scene's robot: command limits, effective mass, loads and object positions."""
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def robot_model(scene: Scene, fastest_rad_s: Floats) -> RobotModel:
 
 
 def object_targets(scene: Scene) -> list[ReachTarget]:
-    """Return the initial positions of loose objects as targets that the tool has to reach."""
+    """Return the initial positions of loose objects as positions that the tool must reach."""
     loose, size_m = scene.objects, np.linalg.norm(scene.objects.half_size_m, axis=1)
     places = zip(loose.names, scene.model.body_pos[scene.object_bodies], size_m, strict=True)
     return [ReachTarget(f"object {name!r}", at, within_m=size) for name, at, size in places]

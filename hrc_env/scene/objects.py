@@ -1,4 +1,4 @@
-"""A task's loose objects, which are bodies of boxes with a free joint in the task's MJCF.
+"""Loose objects of a task: bodies with a free joint that consist of boxes.
 
 In `qpos`, their free joints follow the robot's joints, with seven numbers each: position [m] and
 quaternion (w, x, y, z).
@@ -29,7 +29,7 @@ POSE = 7
 RATE = 6
 """Number of entries of an object's velocity in `qvel`."""
 PITCH_M = 0.10
-"""Maximum distance between neighbouring capsules of a carried box [m]."""
+"""Maximum distance between the axes of neighbouring capsules of a carried box [m]."""
 THINNEST_M = 0.019
 """Minimum radius of a capsule of a carried box [m]."""
 AWAY_M = 1e4
@@ -41,8 +41,8 @@ GRIP_M = 0.01
 def add_task_scene(spec: mujoco.MjSpec, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
     """Add a task's bodies to a scene that is being built.
 
-    Friction cones are elliptic, for which gripped objects slip least: 8 mm in 6 s for 5 kg that are
-    shaken at 3 m/s^2, instead of 31 mm with MuJoCo's defaults.
+    Elliptic friction cones are used, because they reduce the slip of gripped objects to a minimum:
+    8 mm in 6 s for 5 kg that are shaken at 3 m/s^2, instead of 31 mm with MuJoCo's defaults.
 
     Args:
         spec: specification of the scene.
@@ -75,7 +75,7 @@ def add_welds(spec: mujoco.MjSpec, task_scene: TaskScene) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Objects:
-    """The O loose objects of a scene, in their body frames."""
+    """Shapes of the O loose objects of a scene, in their body frames."""
 
     names: tuple[str, ...]
     """Names of the objects."""
@@ -116,7 +116,7 @@ class PaddedCapsules(NamedTuple):
 
 
 class LoadedArm(NamedTuple):
-    """Robots, including the objects that they hold."""
+    """States and paths of robots, including the objects that they hold."""
 
     robot: RobotState
     """State of the robots, including the capsules of held objects."""
@@ -193,7 +193,7 @@ def make_object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools)
         objects: the O objects.
         qpos: (B, nq) generalized positions.
         qvel: (B, nv) generalized velocities.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
     """
     poses, n = objects.poses(qpos), len(objects.names)
     rates = qvel[:, objects.first : objects.first + RATE * n].reshape(len(qvel), n, RATE)
@@ -220,14 +220,14 @@ def find_held(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandSta
 def attach_objects(
     robot: RobotState, path_world: Capsules, objects: Objects, q_path: Floats, held: Bools
 ) -> LoadedArm:
-    """Return the robots, with the objects that they hold as parts of the robots.
+    """Return the states and paths of robots with held objects as parts of the robots.
 
     Args:
         robot: state of the robots.
         path_world: (B, T, K, 2, 3) capsules of the robots along a path [m].
         objects: the O objects.
         q_path: (B, T, nq) `qpos` along the path.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
     """
     if not objects.names:
         return LoadedArm(robot, path_world)
@@ -246,7 +246,7 @@ def _is_free(body: mujoco.MjsBody) -> bool:
 
 
 def _pad_parts(parts: list[list[Floats]]) -> Floats:
-    """Return the boxes of each object as (O, n, `shapes.WIDTH`), padded with absent shapes."""
+    """Return an array (O, n, `shapes.WIDTH`) of the objects' boxes, padded with absent shapes."""
     n = max(map(len, parts), default=0)
     table = np.broadcast_to(absent_shape(), (len(parts), n, WIDTH)).copy()
     for row, boxes in zip(table, parts, strict=True):
@@ -274,7 +274,7 @@ def _find_held(
         poses: (B, O, 7) poses of the boxes, position [m] and quaternion (w, x, y, z).
         half_size: (O, 3) half edge lengths of the boxes [m].
         tool_world: (B, 3) tool points [m].
-        closed_on: (B,) whether the fingers have closed on something.
+        closed_on: mask (B,) of the environments in which the fingers have closed on an object.
         held: (B, O) output, in which the entry of the held box is set to true.
     """
     for b in range(len(poses)):
@@ -293,12 +293,12 @@ def _find_held(
 
 @kernel
 def _place_loads(poses: Floats, capsules: Capsules, held: Bools, loads: Floats) -> None:
-    """Compute the capsules of held objects in the world; those of others are moved to `AWAY_M`.
+    """Compute the world capsules of held objects; move those of all other objects to `AWAY_M`.
 
     Args:
         poses: (B, T, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
         capsules: (O, n, 2, 3) capsules of the objects in the body frames [m]; unused rows are NaN.
-        held: (B, O) whether the robot holds each object.
+        held: mask (B, O) of the objects that the robot holds.
         loads: (B, T, O, n, 2, 3) output, which is filled [m].
     """
     for b, t, o in np.ndindex(poses.shape[:3]):

@@ -1,4 +1,4 @@
-"""Physics of a batch of copies of one scene, in which robots follow commands and workers move.
+"""Physics of a batch of copies of one scene, with commanded robots and moving workers.
 
 The complete state is in the rows of one `mujoco.batch.Batch`, for any batch size: a copy of the
 rows is a copy of the simulation, and results do not depend on the other environments of a batch.
@@ -26,26 +26,30 @@ from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 from hrc_env.world import Effects
 
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
-"""MuJoCo's input fields of a substep without workers: servo commands."""
+"""MuJoCo's state flags of the inputs of a substep without workers: servo commands."""
 INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
-"""MuJoCo's input fields of a substep with workers: servo commands and poses of worker bodies."""
+"""MuJoCo's state flags of the inputs of a substep with workers: servo commands and poses of worker
+bodies."""
 ARM_FIELDS = ("time", "qpos", "qvel", "act", "qacc_warmstart")
-"""Fields of the state that determine the motion of the robot."""
+"""Fields of MuJoCo's state that determine the motion of the robot."""
 OBJECT_FIELDS = ("eq_active", "xfrc_applied")
-"""Further fields that determine the motion of loose objects."""
+"""Further fields of MuJoCo's state that determine the motion of loose objects."""
 PRESSING_N = 40.0
 """Force above which fingers count as pressing on an object [N]."""
 RESTING_M_S = 0.01
 """Speed below which fingers are at rest [m/s]; fingers that press and are at rest count as
 closed."""
 END_MARGIN_RAD = 0.02
-"""Distance from the end of its range at which a joint is stopped [rad], or [m] for a slide."""
+"""Distance from the end of the range at which a joint is stopped [rad], or [m] for a slide."""
 BRAKE_SHARE = 0.7
 """Fraction of the slew limit with which joints brake before the ends of their ranges."""
 
 
 class Servo:
-    """Limits and servos of a joint, in units for a hinge; for a slide, [m] replaces [rad]."""
+    """Limits and servo parameters of a joint.
+
+    The units are those of a hinge; for a slide, [m] replaces [rad].
+    """
 
     low: float
     """Lower end of the joint's range [rad]."""
@@ -65,7 +69,7 @@ SERVO = dtype_of(Servo)
 
 
 class SharedField(NamedTuple):
-    """Views of a field in the simulations without and with workers."""
+    """Views of one MuJoCo field in the simulations without and with workers."""
 
     alone: Floats
     """(B, ...) field in the simulations without workers."""
@@ -75,10 +79,10 @@ class SharedField(NamedTuple):
 
 
 class Saved(NamedTuple):
-    """Content of a pickle of `Physics`."""
+    """Content of a pickled `Physics` object."""
 
     scene: Scene
-    """The scene."""
+    """Scene of the simulations."""
     batch: int
     """Number of simulations, B."""
     state: Floats
@@ -179,7 +183,7 @@ class Physics:
         self._push[:, self.scene.object_bodies] = effects.push_world
 
     def _switch_cups(self, cups: Cups, is_on: Bools) -> None:
-        """Vent cups, or let them seal if `is_on` (B,); a load above the limit tears objects off."""
+        """Activate cups if `is_on` (B,), else vent them; overloaded cups lose their object."""
         q, welded = self._qpos[:, : self._n], self._welded[:, cups.welds] > 0.0
         tool, poses = tool_frame(self.scene.chain, q), self.scene.objects.poses(self._qpos)
         near = find_sealed(cups, tool, poses)
@@ -220,11 +224,11 @@ class Physics:
         """Advance every environment by one control step.
 
         Args:
-            qd_command: (B, N) wanted joint velocities [rad/s]; their magnitude and slew are
+            qd_command: (B, N) desired joint velocities [rad/s]; their magnitude and slew are
                 limited, and they are reduced near the ends of the joints' ranges.
             workers: poses of the workers after every substep, arrays (B, T, W, S, ...); W may be 0.
             out_of_reach: (B,) whether no worker can touch the robot in this step, for which the
-                simulation without workers gives the same result faster; None if this is so for no
+                simulation without workers gives the same result faster; None if this applies to no
                 environment.
             grip: (B,) command of the hands from -1 (open) to 1 (closed); cups are active above 0.
                 None for open hands.
@@ -315,7 +319,7 @@ class Physics:
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
     def _simulate(self, is_selected: Bools, workers: WorkerPath | None) -> None:
-        """Simulate selected environments (B,) with workers or, if they are None, without."""
+        """Simulate selected environments (B,), without workers if `workers` is None."""
         n = np.count_nonzero(is_selected)
         if n == 0:
             return
@@ -364,7 +368,7 @@ def make_empty_path(batch: int, n_substeps: int) -> WorkerPath:
 
 
 def _make_servos(scene: Scene) -> Records1[Servo]:
-    """Return the limits and servos (N,) of the joints of a scene's robot."""
+    """Return the limits and servo parameters (N,) of the joints of a scene's robot."""
     servos, config, chain = make_records(Servo, scene.chain.n_joints), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
@@ -395,9 +399,9 @@ def _substep_commands(
         qd: (B, N) joint velocities [rad/s].
         held: (B, N) angles of the holding servos [rad]; they are kept near those of a blocked
             robot, so that it can move immediately afterwards.
-        command: (B, N) present command [rad/s], which is advanced by the control step.
-        wanted: (B, N) wanted velocities [rad/s]; values that are not finite count as 0.
-        servos: (N,) limits and servos of the joints.
+        command: (B, N) current command [rad/s], which is advanced by the control step.
+        wanted: (B, N) desired velocities [rad/s]; values that are not finite count as 0.
+        servos: (N,) limits and servo parameters of the joints.
         sim_dt: duration of a substep [s].
         control: (B, T, 2 N) output [rad/s]: for the holding servos the mean velocity of each
             substep, because its integral does not depend on the duration of a substep; then for the

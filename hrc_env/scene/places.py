@@ -30,12 +30,12 @@ from hrc_env.world import Grounds, Workplace
 ROBOT_CLEARANCE_M = 0.8
 """Distance that workers' paths keep from the axis of the robot's first joint [m]."""
 HEADROOM_M = 2.1
-"""Height of a shape's lower end above which it obstructs no worker [m], even tall ones with a
-hat."""
+"""Height of a shape's lower end above which it does not obstruct even a tall worker with a hat
+[m]."""
 STEP_OVER_M = 0.02
-"""Height of a shape's upper end below which it obstructs no worker [m]."""
+"""Height of a shape's upper end below which workers can step over it [m]."""
 UPRIGHT = 0.999
-"""Cosine of the tilt above which a box counts as upright."""
+"""Minimum cosine of the tilt of a box that counts as upright."""
 KINDS = {
     mujoco.mjtGeom.mjGEOM_PLANE: PLANE,
     mujoco.mjtGeom.mjGEOM_BOX: BOX,
@@ -45,9 +45,9 @@ KINDS = {
 }
 """Kinds of occluding shapes, by MuJoCo's types of geoms."""
 LEFT_AT = {"pile": "box", "floor": "box", "cart": "cart"}
-"""Props that may stand on the floor, by kind of workplace."""
+"""Prop that may be on the floor at a workplace, by kind of workplace."""
 Footprint = tuple[float, float, float, float, float]
-"""Type of a row of `Grounds.blocked`."""
+"""Type of the footprint of an obstacle, a row of `Grounds.blocked`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Room:
     """Footprints of open walls in the clutter, which people do not walk through; each replaces the
     footprints of the shapes that it contains."""
     flat: tuple[Footprint, ...] = ()
-    """Footprints in the clutter that obstruct the floor and occlude nothing."""
+    """Footprints of clutter that obstructs the floor but does not occlude any view."""
 
     def grounds(
         self, obstacles: Floats, clutter: bool, further: tuple[Workplace, ...] = ()
@@ -108,7 +108,7 @@ SCENES: dict[str, Room] = {
     path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
-"""Scenes by name."""
+"""Descriptions of the scenes by name."""
 
 
 def block_loads(grounds: Grounds, obstacles: Floats) -> Grounds:
@@ -171,7 +171,7 @@ def find_footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Float
     """Return the footprints (N, 5) of shapes that obstruct the floor, as in `Grounds.blocked`.
 
     Footprints of upright boxes are exact, those of other shapes are bounding rectangles along x and
-    y. A shape on the robot's axis is its pedestal, and is omitted.
+    y. A shape on the axis of the robot's first joint is the pedestal, which is omitted.
 
     Args:
         obstacles: (G, `shapes.WIDTH`) fixed shapes.
@@ -191,7 +191,7 @@ def find_footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Float
 
 
 def _half_extent(row: Floats) -> Floats:
-    """Return the half size (3,) of a shape's axis-aligned bounding box [m]."""
+    """Return the half edge lengths (3,) of a shape's axis-aligned bounding box [m]."""
     axes, half = np.abs(row[AXES:HALF_SIZE].reshape(3, 3)), row[HALF_SIZE : HALF_SIZE + 3]
     if row[KIND] == BOX:
         return half @ axes
@@ -199,7 +199,7 @@ def _half_extent(row: Floats) -> Floats:
 
 
 def is_within(points: Floats, footprints: Floats) -> Bools:
-    """Return a mask (N,) of the points x, y, ... (N, 2 or more) in any of footprints (M, 5)."""
+    """Return a mask (N,) of the points (N, 2 or more) that are inside any footprint (M, 5)."""
     x, y, half_length, half_width, yaw = footprints.T
     dx, dy = points[:, :1] - x, points[:, 1:2] - y
     along, aside = np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx

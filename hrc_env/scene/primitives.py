@@ -21,7 +21,7 @@ bit."""
 Vector = Sequence[float] | Floats
 """Type of a vector (3,)."""
 LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
-"""Fields of a geom that is rendered but collides with nothing."""
+"""Fields of a geom that is rendered but never collides."""
 
 
 class RodPose(NamedTuple):

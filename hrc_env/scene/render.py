@@ -1,4 +1,4 @@
-"""Rendering of the scene: plain crops for the detector, and pictures with shadows for viewers.
+"""Rendering of crops without shadows for the detector, and of pictures with shadows for viewers.
 
 A crop is rendered through an off-centre frustum and has the same pixels as a crop of the camera's
 whole image. It is rendered without shadows and antialiasing, which would take two thirds of the
@@ -39,7 +39,7 @@ PICTURE_QUALITY = {
 }
 """MuJoCo's visual quality settings for pictures for viewers."""
 WINDOWS_KEPT = 40
-"""Maximum number of windows per camera with a stored background, including those of a search."""
+"""Maximum number of windows per camera with a stored background, including search windows."""
 
 
 class StillPicture(NamedTuple):
@@ -133,7 +133,10 @@ class CropRenderer(Canvas):
         self.aim(camera, window, window.side_px)
 
     def _remember(self, key: tuple[float, ...], still: StillPicture | None) -> None:
-        """Store a window's picture as the latest one; it is None after the first use."""
+        """Store the background of a window as the most recent one.
+
+        It is None if the window has been used only once.
+        """
         self._kept.pop(key, None)
         self._kept[key] = still
         while len(self._kept) > WINDOWS_KEPT * len(self.scene.cameras):
@@ -141,7 +144,7 @@ class CropRenderer(Canvas):
 
 
 def _key(camera: PinholeCamera, window: Roi) -> tuple[float, ...]:
-    """Return the parameters of a camera and a window, which are the key of a stored picture."""
+    """Return the key of a stored picture: the parameters of the camera and the window."""
     numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
     side = (*window.centre_px, window.side_px, window.rotation_rad)
     return tuple(map(float, (*numbers, *side)))

@@ -1,4 +1,4 @@
-"""The camera rig: pinhole cameras and MuJoCo cameras that are made from settings.
+"""Pinhole cameras and MuJoCo cameras of a rig, which are made from its settings.
 
 Only this module converts between OpenCV's camera axes (+X right, +Y down, +Z forward) and OpenGL's
 (+X right, +Y up, -Z forward).
@@ -18,7 +18,7 @@ from hrc_env.scene.places import SCENES
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
 """Rotation from OpenGL's to OpenCV's camera axes, which is its own inverse."""
 LAB_CAMERAS = SCENES["lab"].cameras
-"""Four cameras below the ceiling, one in each corner, as in the paper's laboratory."""
+"""Four cameras below the ceiling, one in each corner, as in the laboratory of the paper."""
 SITE_CAMERAS = SCENES["site"].cameras
 """Four cameras on masts in the corners of the site."""
 
@@ -26,7 +26,7 @@ SITE_CAMERAS = SCENES["site"].cameras
 def select(
     cameras: tuple[CameraConfig, ...], use: Sequence[int | str] | None = None
 ) -> tuple[CameraConfig, ...]:
-    """Return the cameras in use.
+    """Return the selected cameras of a scene.
 
     Args:
         cameras: all cameras of a scene.

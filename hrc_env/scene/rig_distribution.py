@@ -1,4 +1,4 @@
-"""Distribution of camera rigs, from which a rig is drawn for every episode."""
+"""Distribution of camera rigs, from which a rig is sampled for every episode."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.rigs import RIGS, describe_poor_cameras
 
 TRIES = 100
-"""Maximum number of draws of a camera until it sees the workspace."""
+"""Maximum number of samples of a camera until it sees the workspace."""
 STREAM = 0x10076
 """Key of the random stream for rigs, distinct from those of `Generator.spawn`, which count from
 0."""
@@ -41,8 +41,8 @@ class RigDistribution:
 
     Estimators know the rig of their episode, as after a calibration; calibration errors are faults
     ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera that is inside or behind an
-    obstacle, outside of the room, or sees too little of the workspace is drawn again. At perception
-    levels without cameras, no rig is drawn.
+    obstacle, outside of the room, or sees too little of the workspace is sampled again. At
+    perception levels without cameras, no rig is sampled.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {
@@ -51,7 +51,7 @@ class RigDistribution:
         "turn_rad": "max_rotation_rad",
         "focal_share": "max_focal_change",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     nominal: str | tuple[CameraConfig, ...] = ()
     """Nominal rig, given by its name ("lab_gopro") or its cameras; empty for the rig of the
@@ -61,13 +61,12 @@ class RigDistribution:
     max_rotation_rad: float = 0.0
     """Largest rotation of each camera about any axis [rad]."""
     max_focal_change: float = 0.0
-    """Largest fraction by which a focal length is longer or shorter."""
+    """Largest fraction by which a focal length is increased or decreased."""
     lenses: tuple[Lens, ...] = ()
-    """Lenses from which that of each camera is drawn; empty for the nominal lenses."""
+    """Lenses from which the lens of each camera is sampled; empty for the nominal lenses."""
     n_cameras: int | tuple[int, int] | None = None
-    """Number of cameras, or its bounds (fewest, most), between which it is drawn; None for all
-    cameras. The cameras in use are also drawn; images of the others (`observe_images`) are
-    black."""
+    """Number of cameras, or a range (min, max) from which it is sampled; None for all cameras. The
+    choice of cameras is also random; images of unused cameras (`observe_images`) are black."""
 
     def __post_init__(self) -> None:
         if isinstance(self.nominal, str) and self.nominal not in RIGS:
@@ -87,7 +86,7 @@ class RigDistribution:
                 )
 
     def possible(self, rig: Sequence[CameraConfig]) -> list[CameraConfig]:
-        """Return all combinations of cameras of a rig and lenses that they may have."""
+        """Return all combinations of a camera of a rig and a lens that it may have."""
         return [replace(each, lens=lens) for each in rig for lens in self.lenses or (each.lens,)]
 
     @property
@@ -116,7 +115,7 @@ class RigDistribution:
 def draw_rig(
     distribution: RigDistribution, scene: Scene, rng: np.random.Generator
 ) -> tuple[CameraConfig, ...]:
-    """Draw an episode's rig.
+    """Sample the rig of an episode.
 
     Args:
         distribution: the distribution.
@@ -124,7 +123,7 @@ def draw_rig(
         rng: random generator of the episode.
 
     Raises:
-        ConfigError: none of `TRIES` draws of a camera sees the workspace.
+        ConfigError: none of `TRIES` samples of a camera sees the workspace.
     """
     rig = scene.rig
     fewest, most = distribution.counts(len(rig))
@@ -137,7 +136,7 @@ def draw_rig(
 def _draw_camera(
     distribution: RigDistribution, scene: Scene, camera: CameraConfig, rng: np.random.Generator
 ) -> CameraConfig:
-    """Draw a camera repeatedly until it is in the room and sees the workspace.
+    """Sample a camera repeatedly until it is in the room and sees the workspace.
 
     Args:
         distribution: the distribution.

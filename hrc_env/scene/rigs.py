@@ -30,7 +30,11 @@ RIGS: dict[str, tuple[CameraConfig, ...]] = {
     ),
     "site": SITE_CAMERAS,
 }
-"""Rigs by their names in `cameras=`: those of the scenes, and the lab's with the paper's lens."""
+"""Rigs by their names in `cameras=`.
+
+"lab" and "site" are the rigs of the scenes, and "lab_gopro" is that of the laboratory with the lens
+of the paper's camera.
+"""
 POOR_SHARE = 0.1
 """Fraction of the workspace in a camera's view below which its pose counts as poor."""
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
@@ -44,13 +48,13 @@ ASIDE_M = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2))
 LEAST_SEEN = 3
 """Minimum number of visible heights for which a camera detects a person."""
 FAR_M = 8.0
-"""Distance from a camera within which views are compared [m]."""
+"""Distance from a camera up to which the views of cameras are compared [m]."""
 VIEW_POINTS = 12
-"""Number of points along each axis of a view for the comparison of views."""
+"""Number of sample points along each axis of a view for the comparison of views."""
 
 
 def sample_floor(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
-    """Return points (N, 3) on the walkable floor [m], except those in the robot or in obstacles."""
+    """Return points (N, 3) on the walkable floor [m], outside of the robot and obstacles."""
     points = sample_workspace(grounds, spacing_m)
     points = points[points[:, 2] == HEIGHTS_M[0]] * (1.0, 1.0, 0.0)
     from_robot_m = np.linalg.norm(points[:, :2] - grounds.robot_xy_m, axis=-1)
@@ -58,14 +62,14 @@ def sample_floor(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
 
 
 def coverage(scene: Scene) -> Coverage:
-    """Determine the cameras in a scene that would detect people on each patch of its floor."""
+    """Determine the cameras that would detect a person on each patch of a scene's floor."""
     return coverage_of(scene.cameras, scene.obstacles, sample_floor(scene.grounds, PIECE_M))
 
 
 def coverage_of(
     cameras: tuple[PinholeCamera, ...], still: Floats, floor_world: Points3
 ) -> Coverage:
-    """Determine the cameras that would detect people on each patch of floor.
+    """Determine the cameras that would detect a person on each patch of floor.
 
     Args:
         cameras: the cameras.
@@ -124,12 +128,15 @@ def find_visible(cameras: tuple[PinholeCamera, ...], still: Floats, points_world
 
 
 def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = None) -> list[str]:
-    """Return a sentence for each defect of a scene's rig; the default rig of a scene has none.
+    """Return descriptions of the defects of a scene's rig, one sentence each.
+
+    The default rig of a scene has no defects.
 
     Args:
         scene: the scene with the rig.
         wants_pairs: name of the estimator if it needs two cameras; otherwise "".
-        fewest: smallest number of cameras in an episode if it is drawn; None for that of the rig.
+        fewest: smallest number of cameras in an episode if the number is sampled; None for the
+            number in the rig.
     """
     if fewest == 1 and len(scene.cameras) > 1 and wants_pairs:
         return [
@@ -150,7 +157,7 @@ def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = N
 
 
 def _describe_one_camera(wants_pairs: str) -> str:
-    """Return a sentence about the behaviour of an estimator with only one camera."""
+    """Return a description of an estimator's behaviour with only one camera, in one sentence."""
     if not wants_pairs:
         return "Distances of people are inferred from the usual size of bodies."
     return (
@@ -161,7 +168,10 @@ def _describe_one_camera(wants_pairs: str) -> str:
 
 
 def describe_poor_cameras(scene: Scene) -> list[str]:
-    """Return a sentence for each camera that is in an obstacle or sees too little workspace."""
+    """Return descriptions of poorly placed cameras, one sentence each.
+
+    Such a camera is in an obstacle or sees too small a fraction of the workspace.
+    """
     sentences: list[str] = []
     for camera, share in zip(scene.cameras, _visible_shares(scene), strict=True):
         inside = _is_inside_obstacle(camera, scene.obstacles)

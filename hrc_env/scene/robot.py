@@ -1,4 +1,4 @@
-"""Robots, each of which consists of an MJCF file and a record of the names in it.
+"""Robots, each of which consists of an MJCF file and a record of names of its elements.
 
 In its file, a robot has the centre of its base at the origin, faces +x, and has two servos for each
 joint with a common command [rad/s]: first the servos of all joints that hold the integral of the
@@ -43,37 +43,37 @@ DEFAULT = "ur10e_like"
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A gripper at the end of an arm; in the MJCF, its joints and motor follow the arm's."""
+    """Gripper at the end of an arm. In the MJCF, its joints and motor follow those of the arm."""
 
     joints: tuple[str, ...]
-    """Slides of the fingers; at 0 the gripper is closed, and all fingers open by the same
+    """Names of the slides of the fingers. At 0 the gripper is closed; all fingers open by the same
     distance."""
     pads: tuple[str, ...]
-    """Geoms that touch a gripped object."""
+    """Names of the geoms that touch a gripped object."""
     motor: str
     """Name of the `position` actuator that commands the distance of each finger from the centre
     [m]."""
     spans: tuple[str, ...]
-    """Capsules of the robot that enclose the fingers in any position, for distances and occlusion;
+    """Names of the capsules that enclose the fingers in any position, for distances and occlusion;
     they collide only with people."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Suction:
-    """Suction cups at the end of an arm, which hold objects until released or torn off."""
+    """Suction cups at the end of an arm, which hold objects until they are vented or overloaded."""
 
     site: str
-    """Site at the centre of the cups with z pointing away from the arm; objects have matching
-    sites."""
+    """Name of the site at the centre of the cups with z pointing away from the arm; objects have
+    matching sites."""
     gauge: str
     """Name of the `force` sensor that measures the load on the cups."""
     limit_n: float
-    """Load above which an object is torn off [N]."""
+    """Load above which the cups lose an object [N]."""
     pads: tuple[str, ...]
-    """Geoms that touch an object."""
+    """Names of the geoms that touch an object."""
     spans: tuple[str, ...]
-    """Capsules of the robot that enclose the cups; they collide only with people."""
+    """Names of the capsules that enclose the cups; they collide only with people."""
 
 
 @answer_unknown_fields
@@ -85,36 +85,38 @@ class Robot:
         "watched": "watched_capsules",
         "girth_m": "base_radius_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by former name."""
 
     name: str
-    """Name of the robot in `robot=`."""
+    """Name of the robot, as used in `robot=`."""
     mjcf: str | Path
     """Path of the MJCF file, or its text."""
     joints: tuple[str, ...]
-    """The N hinges and slides, in order from the base to the tool."""
+    """Names of the N joints (hinges and slides), in order from the base to the tool."""
     capsules: tuple[str, ...]
-    """Capsule geoms that represent the surface in contacts, distances and occlusion."""
+    """Names of the capsule geoms that represent the surface in contacts, distances and
+    occlusion."""
     watched_capsules: tuple[str, ...]
-    """Capsules with distal ends that workers watch."""
+    """Names of the capsules with distal ends that workers watch."""
     tool_site: str
-    """Site at the tool point."""
+    """Name of the site at the tool point."""
     home_q: tuple[float, ...]
     """Home pose, with one angle for each joint [rad]."""
     spread_rad: tuple[float, ...]
     """Largest deviation of each joint from `home_q` at a reset [rad]."""
     never_touch: tuple[tuple[str, str], ...] = ()
-    """Pairs (capsule, geom of a scene) without collisions, because they are close in every pose."""
+    """Pairs (capsule, geom of a scene) that are close in every pose; collisions between them are
+    disabled."""
     hand: Hand | None = None
-    """The gripper; None for a robot without a gripper."""
+    """Gripper of the robot; None for a robot without a gripper."""
     suction: Suction | None = None
-    """The suction cups; None for a robot without suction cups."""
+    """Suction cups of the robot; None for a robot without suction cups."""
     drives: bool = False
-    """Whether the robot drives on the floor, with its base frame at the world's origin; otherwise
-    its base is on the scene's pedestal."""
+    """Whether the robot drives on the floor; its base frame is then at the world's origin, and
+    otherwise on the scene's pedestal."""
     base_radius_m: float = 0.0
-    """Radius of a mobile base around the distal ends of `watched_capsules` [m]; people keep away
-    from this cylinder above the floor."""
+    """Radius of a mobile base around the distal ends of `watched_capsules` [m]; people keep out of
+    this vertical cylinder."""
     slew: tuple[float, ...] = ()
     """Limit on the rate of change of each joint's commanded velocity [rad/s^2]; empty for
     `SceneConfig.slew_rad_s2` at every joint."""
@@ -166,9 +168,10 @@ ROBOTS: Registry[Robot] = Registry(
     "robot",
     {path.stem: _read_robot(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))},
 )
-"""Robots by name: those in `assets/robots`, and registered ones."""
+"""Robots by name: the built-in robots in `assets/robots`, and registered robots."""
 BUILT_IN = frozenset(ROBOTS.data.values())
-"""Robots in `assets/robots`, with no capsule that extends beyond the visual geoms by `BARE_M`."""
+"""Robots in `assets/robots`. None of their capsules extends beyond the visual geoms by more than
+`BARE_M`."""
 
 
 def find_robot(robot: str | Robot | Mapping[str, Any]) -> Robot:
@@ -220,7 +223,10 @@ def add_robot(spec: mujoco.MjSpec, robot: Robot, mount_world: Sequence[float]) -
 
 
 def servo_lead_s(robot: Robot, model: mujoco.MjModel) -> Floats:
-    """Return the lead times (N,) of the rate servos [s]: inertia at the home pose over damping."""
+    """Return the lead times (N,) of the rate servos [s].
+
+    A lead time is the joint's inertia at the home pose divided by the servo's damping.
+    """
     data, n = mujoco.MjData(model), len(robot.joints)
     data.qpos[:n] = robot.home_q
     mujoco.mj_forward(model, data)
@@ -265,7 +271,7 @@ def check_robot(robot: Robot) -> None:
 
 
 def find_grip(robot: Robot, model: mujoco.MjModel) -> Grip | None:
-    """Return indices and motor of a robot's hand in a scene; None if the robot has no hand."""
+    """Return the indices and the motor of a robot's hand in a scene; None without a hand."""
     if robot.hand is None:
         return None
     fingers = [model.joint(PREFIX + name).qposadr[0] for name in robot.hand.joints]

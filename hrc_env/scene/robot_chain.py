@@ -61,7 +61,7 @@ def parse_mjcf(robot: "Robot") -> mujoco.MjSpec:
 
 
 def _read_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
-    """Return the kinematic chain of a robot; errors do not contain the robot's name."""
+    """Return the kinematic chain of a robot; its errors do not name the robot."""
     model, n = parse_mjcf(robot).compile(), len(robot.joints)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)  # all joints at 0

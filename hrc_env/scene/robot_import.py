@@ -40,11 +40,11 @@ TURN = 2 * np.pi
 """Range in both directions of a joint without limits [rad]."""
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
-"""MuJoCo's types of joints."""
+"""MuJoCo's codes of the types of joints."""
 
 
 class Chain(NamedTuple):
-    """Names of a serial chain in an MJCF."""
+    """Names of the joints and links of a serial chain in an MJCF."""
 
     joints: list[str]
     """Names of the joints."""
@@ -185,7 +185,7 @@ def _limit_spread(
 
 
 def _keep_files(spec: mujoco.MjSpec) -> None:
-    """Make the paths of meshes and textures absolute, because MJCF text has no folder."""
+    """Make the paths of meshes and textures absolute, because an MJCF text has no location."""
     folder = Path(spec.modelfiledir or ".")
     for parts, subfolder in ((spec.meshes, spec.meshdir), (spec.textures, spec.texturedir)):
         for part in parts:
@@ -195,7 +195,7 @@ def _keep_files(spec: mujoco.MjSpec) -> None:
 
 
 def _keep_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
-    """Make the inertia of links explicit, because geoms that determine it may be removed."""
+    """Make the inertia of links explicit; the geoms that determine it may be removed later."""
     for body in spec.bodies[1:]:
         k = model.body(body.name).id if body.name else body.id
         body.mass = float(model.body_mass[k])

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from hrc_env.scene.robot import Robot
 
 BARE_M = 0.1
-"""Distance of a capsule's surface from the visual geoms above which the capsule is rendered [m]."""
+"""Distance between a capsule's surface and the visual geoms above which the capsule is rendered
+[m]."""
 INSIDE_M = 0.005
 """Depth in another capsule beyond which a point on a capsule is not on the outer surface [m]."""
 UNLIKE_M = 0.05
@@ -58,7 +59,7 @@ def bare_capsules(robot: "Robot") -> frozenset[str]:
 
 
 def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mismatch]:
-    """Compare each capsule with the visual geoms on its own and adjacent links, in the home pose.
+    """Compare each capsule with the visual geoms on its link and adjacent links, in the home pose.
 
     Args:
         robot: the robot.
@@ -134,7 +135,7 @@ def sample_surface(
 
 
 class Solid(NamedTuple):
-    """A geom in its pose, for tests of whether points are inside."""
+    """Geom in a given pose, used to determine whether points are inside it."""
 
     kind: int
     """MuJoCo's type of the geom."""
@@ -150,7 +151,7 @@ class Solid(NamedTuple):
     """(F, 4) half-spaces of a mesh's convex hull; empty for other types."""
 
     def contains(self, points_world: Points3) -> Bools:
-        """Return a mask (N,) of the points (N, 3) inside; for a mesh, inside its convex hull."""
+        """Return a mask (N,) of points (N, 3) inside the geom; a mesh counts as its convex hull."""
         off = points_world - self.position_world
         inside = np.linalg.norm(off, axis=-1) < self.bounding_radius_m
         inside[inside] = self._contains(off[inside] @ self.rotation)
@@ -249,7 +250,7 @@ def distance_from_looks_m(capsule_points: Points3, looks: Sequence[Points3]) -> 
 
 
 def _grid(length_m: float, spacing_m: float) -> int:
-    """Return the number of points along a length for a given spacing."""
+    """Return the number of points along a length (rounded up) for a given spacing."""
     return int(np.clip(np.ceil(length_m / spacing_m), 1, 60 * SPACING_M / spacing_m)) + 1
 
 

@@ -14,7 +14,7 @@ from hrc_env.scene.worker_visuals import show_workers
 
 
 class Viewer:
-    """A window that shows one environment.
+    """Interactive window that shows one environment.
 
     Drag the mouse to rotate the view. The environment continues to run after the window is closed.
 
@@ -44,7 +44,7 @@ class Viewer:
             ) from error
 
     def show(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Update the poses in the window.
+        """Update the poses of robot and workers in the window.
 
         Args:
             q: (N,) joint angles of the robot [rad].

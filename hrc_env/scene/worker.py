@@ -1,4 +1,4 @@
-"""Addition of workers to a MuJoCo model, as mocap bodies with capsules.
+"""Functions that add workers to a MuJoCo model as mocap bodies with capsules.
 
 A worker is moved kinematically: 22 mocap bodies take positions and rotations from `WorkerMotion`.
 Contacts are computed with the capsules, which are not rendered; cameras see the visual meshes of
@@ -15,11 +15,11 @@ from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, add_capsule
 from hrc_env.worker.body import SEGMENTS, Body, load_body
 
 CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb")
-"""Fields of MuJoCo's model in which the capsules of different bodies differ."""
+"""Fields of MuJoCo's model that differ between the capsules of different bodies."""
 
 
 def add_worker(spec: mujoco.MjSpec, body: Body, prefix: str) -> None:
-    """Add a worker in its rest pose to a specification; the prefix precedes all of its names."""
+    """Add a worker in its rest pose to a specification, with a prefix to all of its names."""
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)

@@ -62,7 +62,7 @@ def add_visuals(spec: mujoco.MjSpec, body: Body, looks: WorkerMesh, prefix: str)
 
 
 def add_props(spec: mujoco.MjSpec, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> None:
-    """Add a copy of every prop for each worker, and the loads on the floor, all out of sight.
+    """Add a copy of every prop for each worker, and the loads on the floor, all out of view.
 
     Without workers, nothing is added.
 
@@ -133,7 +133,7 @@ def _prop_rows(model: mujoco.MjModel) -> Ints:
 
 
 def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None) -> None:
-    """Show one body of each worker, and hide the others.
+    """Show one body of each worker, and hide all other bodies.
 
     Args:
         model: drawing model of the caller, which is changed.

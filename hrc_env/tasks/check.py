@@ -41,7 +41,7 @@ RENAMED = {
     "grips": "needs_gripper",
     "drives": "needs_mobile_base",
 }
-"""Present names of a task's attributes and methods, by their former names."""
+"""Current names of renamed attributes and methods of tasks, by former name."""
 
 
 def check_task(task: object) -> None:
@@ -227,8 +227,8 @@ def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
     """Raise `ConfigError` if the info of a step has invalid numbers of attempts or success.
 
     `achieved` and `failed` are non-negative numbers of attempts. `is_success` is 1 if the episode
-    would be a success if it ended now, and otherwise 0. These are different measures, and tables
-    show both.
+    would be a success if it ended now, and otherwise 0. The two measures differ, and tables show
+    both.
     """
     for name in (task.achieved, task.failed):
         values = np.asarray(info[name], float)

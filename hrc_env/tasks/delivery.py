@@ -1,10 +1,10 @@
-"""Delivery: a mobile base transports material across a site on which people work.
+"""Delivery: a mobile base transports material across a construction site where people work.
 
 Zones are areas of free floor away from workplaces. In an episode, the base starts in one zone and
 drives to another. The material is on the bed from the start, and is delivered when the base stands
 in the destination zone; it is not unloaded. The map of the obstacles is known: the path to the
 zone, which avoids all obstacles, and the ranges of the base's scanner are computed from that map,
-not from images. The map does not contain people; only the estimate does.
+not from images. People are not on the map; they are observed only by cameras.
 """
 
 import math
@@ -34,7 +34,7 @@ from hrc_env.tasks.task import Task
 from hrc_env.world import Grounds, World
 
 CELL_M = 0.2
-"""Spacing of the map's grid points [m]."""
+"""Spacing of the grid points of the map [m]."""
 MAP_BORDER_M = 3.0
 """Width of the map's border around the area where people walk, on which the base may also drive
 [m]."""
@@ -81,7 +81,7 @@ class DeliveryConfig:
     delivered_bonus: float = 20.0
     """Reward for the delivery."""
     hit_penalty: float = 5.0
-    """Penalty for each time the base begins to touch an obstacle, in both kinds of reward."""
+    """Penalty for each new contact of the base with an obstacle, for both kinds of reward."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "zone_m", "standing_m_s")
@@ -129,7 +129,8 @@ class DeliveryState:
     people: bool
     """Whether the base touches a worker."""
     hits: Annotated[Ints, (2,)]
-    """Numbers of times that the base began to touch an obstacle, and a worker."""
+    """Numbers of contacts of the base with obstacles and with workers that began in this
+    episode."""
     delivered: bool
     """Whether the material has been delivered."""
 
@@ -138,9 +139,9 @@ class DeliveryStep:
     """Results of one control step of one environment."""
 
     progress_m: float
-    """Length by which the remaining path became shorter [m]."""
+    """Decrease of the length of the remaining path in this step [m]."""
     hit: bool
-    """Whether the base began to touch an obstacle."""
+    """Whether a contact of the base with an obstacle began in this step."""
     delivered: bool
     """Whether the base is at rest in the destination zone."""
 
@@ -150,7 +151,7 @@ DELIVERY = dtype_of(DeliveryState)
 
 @dataclass(frozen=True, slots=True)
 class DeliveryView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     goal_world: Floats
     """(B, 2) centre of the destination zone, x and y [m]."""
@@ -169,7 +170,7 @@ def _has_valid_length(site: Site, config: DeliveryConfig) -> Bools:
 
 
 def _measure(state: Records1[DeliveryState], robot: RobotState, site: Site) -> None:
-    """Update remaining path, path direction and scanner ranges at the robots' positions."""
+    """Update the remaining path, its direction and the scanner ranges for the robots' positions."""
     state["ranges_m"] = ranges_m(robot.q, ANGLES, site.gaps, site.origin, CELL_M, RANGE_M)
     _follow_ways(robot.q, site.ways, site.origin, state)
 
@@ -199,7 +200,7 @@ def _follow_ways(q: Floats, ways: Floats, origin: Floats, states: Records1[Deliv
 
 
 class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
-    """Bring material across a construction site, among the workers, and hit nothing."""
+    """Transport material across a construction site without hitting obstacles or workers."""
 
     id = "HRCDelivery-v0"
     config_type = DeliveryConfig
@@ -314,7 +315,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     def draw_start(
         self, rngs: Rngs, place: Site, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """Draw initial poses (n, 3) in zones with a valid destination, with any heading."""
+        """Sample initial poses (n, 3) with random headings, in zones with a valid destination."""
         has_destination = _has_valid_length(place, self.config).any(1)
         starts: list[list[float]] = []
         for rng in rngs:
@@ -324,7 +325,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return np.array(starts).reshape(-1, 3)
 
     def reset(self, state: Records1[DeliveryState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the destination zones of environments `ids`."""
+        """Sample the destination zones of environments `ids`."""
         site: Site = world.place
         state[ids] = np.zeros((), DELIVERY)
         valid = _has_valid_length(site, self.config)
@@ -361,7 +362,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return step["delivered"]
 
     def view(self, state: Records1[DeliveryState], ids: Ints) -> DeliveryView:
-        """Return zone, remaining path and ranges of the scanner in environments `ids`."""
+        """Return the destination, remaining path and scanner ranges in environments `ids`."""
         rows = state[ids]
         return DeliveryView(
             rows["goal_world"], rows["way_m"], rows["way_direction"], rows["ranges_m"]

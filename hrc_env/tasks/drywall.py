@@ -61,7 +61,8 @@ MOVED_M = 0.02
 TURNED_RAD = 0.06
 """Largest initial rotation of the board on the stack [rad]."""
 RADIAN_M = 0.3
-"""Distance that is equivalent to a rotation of the board by 1 rad in the progress [m]."""
+"""Distance to which a rotation of the board by 1 rad is equivalent in the computation of progress
+[m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,7 @@ class DrywallState:
     done: bool
     """Whether the board is fixed in position and released."""
     left_m: float
-    """Remaining distance of board and tool to their targets, in total [m]."""
+    """Sum of the remaining distances of board and tool to their targets [m]."""
 
 
 class DrywallStep:
@@ -136,7 +137,7 @@ DRYWALL = dtype_of(DrywallState)
 
 @dataclass(frozen=True, slots=True)
 class DrywallView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     place_world: Points3
     """(3,) target position of the board's centre [m]."""
@@ -159,7 +160,7 @@ class ScrewProgress(NamedTuple):
     driven: Ints
     """(B,) number of screws that have been driven."""
     boring: Bools
-    """(B,) whether a screw is being driven."""
+    """Mask (B,) of the environments in which a screw is being driven."""
 
 
 def measure_offset(board: ObjectState) -> BoardOffset:
@@ -183,7 +184,7 @@ def _measure_ways(
         board_world: (B, 3) centres of the boards [m].
         R: (B, 3, 3) rotations world_from_board.
         tool_world: (B, 3) tool points of the robots [m].
-        is_taken: (B,) whether the tool has already reached the board.
+        is_taken: mask (B,) of the boards that the tool has reached.
     """
     away_m = np.linalg.norm(board_world - (FOOT_WORLD + PLACE_M), axis=-1)
     away_m = away_m + RADIAN_M * _measure_turn(R)
@@ -281,7 +282,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return make_records(DrywallState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return stack, board and studs, and the workplace where the worker drives the screws."""
+        """Return the stack, the board, the studs and the workplace of the worker."""
         place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
         return TaskScene(
             Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
@@ -302,7 +303,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         ]
 
     def reset(self, state: Records1[DrywallState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the initial pose of the board on the stack and the forces, in environments `ids`."""
+        """Sample the initial board pose and the screw forces of environments `ids`."""
         state[ids] = np.zeros((), DRYWALL)
         low, high = self.config.push_n
         for b in map(int, ids):
@@ -355,7 +356,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return step
 
     def effects(self, state: Records1[DrywallState]) -> Effects:
-        """Return the force of the screw that is being driven; four screws fix the board."""
+        """Return the force on the board while a screw is driven; the last screw fixes the board."""
         screw = np.minimum(state["driven"], len(SCREWS_M) - 1)
         rows = np.arange(len(state))
         push_n = np.where(state["boring"], state["push_n"][rows, screw], 0.0)
@@ -367,17 +368,17 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
     def signal(self, state: Records1[DrywallState]) -> WorkerSignal:
-        """Return the stages: the worker may work while the board is in position."""
+        """Return the signal to workers, which may work while the board is in position."""
         return WorkerSignal(
             (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
         )
 
     def is_load(self, state: Records1[DrywallState]) -> Bools:
-        """Return a mask (B, 1) of the boards that count as part of the robot, until in position."""
+        """Return a mask (B, 1) of boards that are not yet in position, which are loads."""
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return a mask (B, W, S) of arms near the screws, while the board is held in position."""
+        """Return a mask (B, W, S) of arms near the screws of a board that is held in position."""
         board = require(belief.objects, "A board")
         is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
         screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
@@ -394,7 +395,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
     def info(self, state: Records1[DrywallState]) -> dict[str, Floats]:
-        """Return numbers of screws and largest deviations of the board (B,) by name.
+        """Return the numbers of screws and the largest deviations of the board, each (B,), by name.
 
         An episode is a success if the board is fixed in position and released.
         """

@@ -59,14 +59,14 @@ class Goal:
     bound: float
     """Largest magnitude of an entry; larger values are clipped."""
     achieved: Callable[[Belief], Floats]
-    """Function of the belief that returns the achieved goals (B, size), as known to the robot."""
+    """Callable that computes the achieved goals (B, size), as known to the robot, from a belief."""
     desired: Callable[[Belief], Floats]
-    """Function of the belief that returns the desired goals (B, size)."""
+    """Callable that computes the desired goals (B, size) from a belief."""
     reward: Callable[[Floats, Floats, Any], Floats]
-    """Function of achieved goals (..., size), desired goals (..., size) and the task's settings
-    that returns the rewards (...)."""
+    """Callable that computes the rewards (...) from achieved goals (..., size), desired goals (...,
+    size) and the task's settings."""
     doc: str
-    """Sentence about the reward for the environment's page."""
+    """Description of the reward for the environment's documentation page, in one sentence."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a function does not take the expected arguments."""
@@ -104,7 +104,7 @@ def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
-    """Return the reward term of a goal, computed from the observation; empty without a goal."""
+    """Return the reward term of a goal, computed from the observation, or () without a goal."""
     if goal is None:
         return ()
 

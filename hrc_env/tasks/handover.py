@@ -62,7 +62,7 @@ CLOSES_S = 0.4
 STIFFNESS_N_M = 100.0
 """Stiffness of the worker's hand that holds the tool, modelled as a spring [N/m]."""
 DAMPING_NS_M = 12.0
-"""Damping of the worker's hand that holds the tool [Ns/m], which is stable at 25 Hz."""
+"""Damping of the worker's hand that holds the tool [Ns/m]. The value is stable at 25 Hz."""
 CARRIES_S = 0.4
 """Time over which the hand takes over the weight of the tool [s]."""
 TWIST_NMS = np.array([0.03, 0.03, 0.001])
@@ -130,7 +130,7 @@ class HandoverState:
     done: bool
     """Whether the tool has been handed over."""
     left_m: float
-    """Remaining distance of fingers and tool to their targets, in total [m]."""
+    """Sum of the remaining distances of fingers and tool to their targets [m]."""
 
 
 class HandoverStep:
@@ -149,16 +149,16 @@ HANDOVER = dtype_of(HandoverState)
 
 @dataclass(frozen=True, slots=True)
 class HandoverView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     meet_world: Points3
     """(3,) position near which the worker extends a hand [m]."""
     taken: Bools
-    """(B,) whether the worker has taken the tool, which the robot can feel."""
+    """Mask (B,) of the tools that the worker has taken, which the robot can sense."""
 
 
 class Handle(NamedTuple):
-    """Motion of the tools' handles."""
+    """Position and velocity of the tools' handles."""
 
     position_world: Points3
     """(B, 3) position of each handle [m]."""
@@ -167,7 +167,7 @@ class Handle(NamedTuple):
 
 
 def _find_handle(tool: ObjectState) -> Handle:
-    """Return position and velocity of the handles of tools (B, 1)."""
+    """Return the positions and velocities of the handles of tools (B, 1)."""
     R, up = matrix(tool.quaternion_wxyz[:, 0]), np.array([0.0, 0.0, HANDLE_UP_M])
     turning = np.cross(tool.spin_object[:, 0], up)
     velocity = tool.velocity_world[:, 0] + (R @ turning[..., None])[..., 0]
@@ -246,8 +246,10 @@ def _measure_ways(
         tool_middle: (B, 3) centres of the tools [m].
         handle: (B, 3) positions of the handles [m].
         tool_world: (B, 3) tool points of the robots [m].
-        held: (B,) whether the robot holds the tool, for which the distance of the fingers is 0.
-        taken: (B,) whether the worker has taken the tool, for which the remaining distance is 0.
+        held: mask (B,) of the tools that the robot holds; for these, the distance of the fingers is
+            0.
+        taken: mask (B,) of the tools that the worker has taken; for these, the remaining distance
+            is 0.
     """
     to_tool_m = _measure_fingers_gap(tool_world, tool_middle)
     to_hand_m = np.linalg.norm(handle - (FOOT_WORLD + MEET_M), axis=-1)
@@ -329,7 +331,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return make_records(HandoverState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return stand and tool, and the workplace of the worker."""
+        """Return the stand, the tool and the workplace of the worker."""
         place = Workplace("meeting", "task", BESIDE_M, np.pi, HAND_UP_M)
         mjcf = Path(assets_dir() / "tasks" / "handover.xml").read_text()
         return TaskScene(mjcf, (), (place,))
@@ -339,7 +341,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return [ReachTarget("the handover position", FOOT_WORLD + MEET_M)]
 
     def reset(self, state: Records1[HandoverState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the initial pose of the tool in its stand, in environments `ids`."""
+        """Sample the initial pose of the tool in its stand, for environments `ids`."""
         state[ids] = np.zeros((), HANDOVER)
         for b in map(int, ids):
             half = 0.5 * 0.05 * (2.0 * rngs[b].random() - 1.0)
@@ -358,7 +360,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     def advance(
         self, state: Records1[HandoverState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[HandoverStep]:
-        """Evaluate tool and hand, let the hand grasp, and return the results (B,) of the step."""
+        """Update tool and hand, let the hand grasp, and return the results (B,) of the step."""
         tool, step = require(world.objects, "A tool"), make_records(HandoverStep, len(state))
         workers = require(world.workers, "The state of the workers")
         held, middle, handle = tool.held[:, 0], tool.position_world[:, 0], _find_handle(tool)
@@ -386,18 +388,18 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return Effects({}, state["push"][:, None].copy())
 
     def signal(self, state: Records1[HandoverState]) -> WorkerSignal:
-        """Return the stages and the positions of lifted tools, at which workers may take them."""
+        """Return the signal to workers, with the positions at which they may take lifted tools."""
         stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
         return WorkerSignal(
             stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan)
         )
 
     def is_load(self, state: Records1[HandoverState]) -> Bools:
-        """Return a mask (B, 1) of the tools that count as part of the robot, until offered."""
+        """Return a mask (B, 1) of tools that have not been offered, which are loads."""
         return ~(state["offered"] | state["taken"])[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return a mask (B, W, S) of arms near the handle, while the gripper holds the tool up."""
+        """Return a mask (B, W, S) of arms near the handle of a tool that the gripper has lifted."""
         tool = require(belief.objects, "A tool")
         middle, handle = tool.position_world[:, 0], _find_handle(tool).position_world
         away_m = _measure_fingers_gap(belief.robot.tool_world, middle)
@@ -411,7 +413,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return step["done"]
 
     def view(self, state: Records1[HandoverState], ids: Ints) -> HandoverView:
-        """Return meeting position and whether the worker has the tool, in environments `ids`."""
+        """Return meeting position and mask of taken tools for environments `ids`."""
         return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
 
     def info(self, state: Records1[HandoverState]) -> dict[str, Floats]:

@@ -19,7 +19,7 @@ from hrc_env.world import Effects, WorkerSignal
 
 @dataclass(slots=True)
 class Sizes:
-    """Sizes of the axes of a hook's result."""
+    """Sizes of the axes of the arrays that hooks return."""
 
     batch: int
     """Number of environments, B."""
@@ -30,7 +30,8 @@ class Sizes:
 
 
 Check = Callable[[str, object, Sizes], None]
-"""Type of checks, which take (name for errors, result of a hook, sizes) and raise `ConfigError`."""
+"""Type of check functions, which take the name of a hook for error messages, the hook's result and
+the sizes, and raise `ConfigError`."""
 
 
 def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
@@ -139,11 +140,12 @@ CHECKS: dict[str, Check] = {
     "markers": _check_points,
     "signal": _check_signal,
 }
-"""Checks of results, by name of the hook."""
+"""Check of the result of each hook, by name of the hook."""
 WRITERS = ("reset", "set_goal", "advance")
-"""Hooks that write to their first argument, the state; all others only read it."""
+"""Names of the hooks that write to their first argument, the state; all other hooks only read
+it."""
 UNPROTECTED = ("make_state", "make_scene", "reach_targets", "counts")
-"""Hooks without shared arrays in their arguments."""
+"""Names of the hooks without shared arrays in their arguments."""
 
 
 def protect_arrays(task: AnyTask) -> AnyTask:

@@ -11,7 +11,7 @@ from hrc_env.world import FOOT_WORLD
 ARMS = ((6, 14), (7, 15))
 """Indices of forearm and hand of each side in `geometry.distances.segments`."""
 PARTNER_RADIUS_M = 0.6
-"""Horizontal distance between trunk and workplace within which a worker takes part in the task
+"""Maximum horizontal distance between workplace and trunk for a worker to count as the partner
 [m]."""
 
 
@@ -27,7 +27,7 @@ def find_partner_arms(
         estimate: estimate of the workers.
         stand_xy_m: position of the task's workplace relative to the robot's base, x and y [m].
         place_world: (B, 2, 3) end points of the line segment where hands work [m].
-        within_m: distance between hand and line segment within which an arm is included [m].
+        within_m: maximum distance of the hand from the line segment for an arm to be included [m].
     """
     bodies, trunk = segments(estimate.mean_world), estimate.mean_world[:, :, TORSO, :2].mean(2)
     off_m = np.linalg.norm(trunk - (FOOT_WORLD[:2] + stand_xy_m), axis=-1)

@@ -36,7 +36,7 @@ PLACES_WORLD = FOOT_WORLD + np.array(PLACES_M)
 STACK = Workplace("stack", "task", (1.025, -0.62), np.pi, SURFACE_M, loads=("stud",) * 4)
 """Workplace where the worker takes pieces from the other end of the table."""
 TRESTLE = Workplace("trestle", "bench", (2.10, -1.50), 0.0, SURFACE_M)
-"""Workplace where the worker puts these pieces down."""
+"""Workplace where the worker puts down the pieces that were taken from the table."""
 ROW_M = 0.12
 """Initial spacing of the pieces in the row [m]."""
 ASIDE_M = 0.02
@@ -47,7 +47,7 @@ TURN_RAD = 0.2
 
 @dataclass(frozen=True, slots=True)
 class PlacedConfig:
-    """Criteria for a piece that is placed: at rest in its target pose and released."""
+    """Criteria for a placed piece, which is at rest in its target pose and released."""
 
     tolerance_m: float = 0.01
     """Distance of a piece's centre from its target below which the piece is in position [m]."""
@@ -85,7 +85,7 @@ class PickPlaceState:
     placed: Annotated[Bools, (STUDS,)]
     """Whether each piece is placed."""
     left_m: float
-    """Remaining distance of pieces and tool to their targets, in total [m]."""
+    """Sum of the remaining distances of pieces and tool to their targets [m]."""
     dropped: bool
     """Whether a piece has fallen below the table."""
 
@@ -106,10 +106,10 @@ PICK_PLACE = dtype_of(PickPlaceState)
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     placed: Bools
-    """(B, 3) whether each piece is at rest in its target pose and released."""
+    """Mask (B, 3) of the pieces that are at rest in their target pose and released."""
     places_world: Points3
     """(3, 3) target position of each piece's centre [m, world]."""
 
@@ -204,7 +204,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return make_records(PickPlaceState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return table, rack and pieces, and the two workplaces of the worker."""
+        """Return the table, the rack, the pieces and the two workplaces of the worker."""
         mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
         return TaskScene(mjcf, (), (STACK, TRESTLE))
 
@@ -217,7 +217,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         ]
 
     def reset(self, state: Records1[PickPlaceState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the initial poses of the pieces in environments `ids`."""
+        """Sample the initial poses of the pieces in environments `ids`."""
         state[ids] = np.zeros((), PICK_PLACE)
         x, y = ROW_AT_M
         for b in map(int, ids):
@@ -258,7 +258,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return step["done"]
 
     def view(self, state: Records1[PickPlaceState], ids: Ints) -> PickPlaceView:
-        """Return the placed pieces and all target positions in environments `ids`."""
+        """Return the mask of placed pieces in environments `ids`, and all target positions."""
         return PickPlaceView(state["placed"][ids].copy(), PLACES_WORLD)
 
     def info(self, state: Records1[PickPlaceState]) -> dict[str, Floats]:

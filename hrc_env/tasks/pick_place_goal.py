@@ -20,13 +20,13 @@ ALL = "all"
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceGoalConfig(PlacedConfig):
-    """Criteria for placed pieces, for the reward and for the success."""
+    """Criteria for placed pieces: `goal_m` for the reward, the other tolerances for the success."""
 
     goal_m: float = 0.02
     """Measured distance of a piece's centre from its target below which the reward counts the piece
     as placed [m]."""
     reward: str = EACH
-    """Kind of reward: "each" for minus the proportion of pieces that are not placed, "all" for -1
+    """Kind of reward: "each" for minus the fraction of pieces that are not placed, "all" for -1
     until all pieces are placed and then 0."""
 
     def __post_init__(self) -> None:
@@ -46,7 +46,7 @@ def reward_placing(achieved: Floats, desired: Floats, config: PickPlaceGoalConfi
         config: radius `goal_m` and kind of reward.
 
     Returns:
-        Minus the proportion of pieces that are farther than the radius from their targets; if
+        Minus the fraction of pieces that are farther than the radius from their targets; if
         `config.reward` is "all", -1 if any piece is, and otherwise 0.
     """
     off = (achieved - desired).reshape(*achieved.shape[:-1], STUDS, 3)

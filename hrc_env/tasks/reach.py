@@ -24,7 +24,7 @@ class TargetConfig:
     radius_m: float = 0.05
     """Distance of the tool point from a goal below which the goal is reached [m]."""
     base_xy_world: tuple[float, float] = FOOT_M[:2]
-    """Position of the robot's first joint axis, around which goals are drawn, x and y [m]."""
+    """Position of the robot's first joint axis, around which goals are sampled, x and y [m]."""
     distance_m: tuple[float, float] = (0.5, 0.95)
     """Range of the goals' horizontal distance from the axis of the robot's first joint [m]."""
     azimuth_rad: tuple[float, float] = (-1.2, 1.2)
@@ -61,11 +61,11 @@ class ReachState:
     """State of one environment's goals."""
 
     goal_world: Annotated[Points3, (3,)]
-    """Position of the present goal [m]."""
+    """Position of the current goal [m]."""
     goal_age_s: float
-    """Time since the present goal appeared [s]."""
+    """Time since the current goal appeared [s]."""
     distance_m: float
-    """Distance of the tool point from the present goal [m]."""
+    """Distance of the tool point from the current goal [m]."""
     n_reached: int
     """Number of goals that were reached in this episode."""
     n_missed: int
@@ -89,12 +89,12 @@ REACH_STEP = dtype_of(ReachStep)
 
 @dataclass(frozen=True, slots=True)
 class ReachView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     goal_world: Points3
-    """(B, 3) position of the present goal [m]."""
+    """(B, 3) position of the current goal [m]."""
     time_left_s: Floats
-    """(B,) remaining time until the present goal is missed [s]."""
+    """(B,) remaining time until the current goal is missed [s]."""
 
 
 @kernel
@@ -141,7 +141,7 @@ MIDDLE = "the center of its goals"
 def _draw_goals(
     state: Records1[ReachState], ids: Ints, rngs: Rngs, tool_world: Points3, config: ReachConfig
 ) -> None:
-    """Draw a new goal for each of environments `ids`.
+    """Sample a new goal for each of environments `ids`.
 
     Args:
         state: state of all environments; rows `ids` are written.
@@ -191,7 +191,7 @@ def make_target(goal: Floats, config: TargetConfig) -> ReachTarget:
 
 
 def draw_goal(rng: np.random.Generator, config: TargetConfig) -> Vector3:
-    """Draw the position of a goal in the world frame [m]."""
+    """Sample the position of a goal in the world frame [m]."""
     x, y = config.base_xy_world
     limits = config.distance_m, config.azimuth_rad, config.height_m
     distance_m, azimuth_rad, z = (
@@ -282,13 +282,13 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         return [make_target(goal, self.config)]
 
     def set_goal(self, state: Records1[ReachState], ids: Ints, goals: Floats, world: World) -> None:
-        """Replace the drawn goals of environments `ids` by given ones."""
+        """Replace the sampled goals of environments `ids` by given ones."""
         state["goal_world"][ids] = goals
         off_m = np.linalg.norm(goals - world.robot.tool_world, axis=-1)
         state["distance_m"][ids] = off_m
 
     def reset(self, state: Records1[ReachState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the first goal of each of environments `ids`."""
+        """Sample the first goal of each of environments `ids`."""
         state["n_reached"][ids] = state["n_missed"][ids] = 0
         _draw_goals(state, ids, rngs, world.robot.tool_world, self.config)
 
@@ -322,5 +322,5 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         }
 
     def markers(self, view: ReachView) -> Points3:
-        """Return the positions (B, 1, 3) of the present goals [m]."""
+        """Return the positions (B, 1, 3) of the current goals [m]."""
         return view.goal_world[:, None]

@@ -31,7 +31,7 @@ class ReachGoalState:
 
 @dataclass(frozen=True, slots=True)
 class ReachGoalView:
-    """Knowledge of the robots about their task."""
+    """Information about the task that is available to the robots."""
 
     goal_world: Points3
     """(B, 3) position of the goal [m]."""
@@ -80,12 +80,12 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
     def set_goal(
         self, state: Records1[ReachGoalState], ids: Ints, goals: Floats, world: World
     ) -> None:
-        """Replace the drawn goals of environments `ids` by given ones."""
+        """Replace the sampled goals of environments `ids` by given ones."""
         state["goal_world"][ids] = goals
         state["there"][ids] = self._is_there(world.robot.tool_world, goals)
 
     def reset(self, state: Records1[ReachGoalState], ids: Ints, rngs: Rngs, world: World) -> None:
-        """Draw the goal of each of environments `ids`."""
+        """Sample the goal of each of environments `ids`."""
         for b, tool_world in zip(map(int, ids), world.robot.tool_world, strict=True):
             goal_world = np.array(draw_goal(rngs[b], self.config))
             state["goal_world"][b] = goal_world
@@ -107,7 +107,10 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         return ReachGoalView(state["goal_world"][ids])
 
     def info(self, state: Records1[ReachGoalState]) -> dict[str, Floats]:
-        """Return whether the tool is at its goal (B,) by name; its final position counts."""
+        """Return whether each tool is at its goal, (B,) by name.
+
+        An episode is a success if the tool is at its goal at the end.
+        """
         there = state["there"].astype(float)
         return {
             "task/goals_reached": there,

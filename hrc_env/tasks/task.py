@@ -35,10 +35,10 @@ class Task(Generic[ConfigT, StateT]):
     All methods work on a batch of environments. `state` is a structured array, or a dataclass of
     arrays, with a row for every environment; `ids` are the indices of the rows to process. A method
     without `ids` processes all rows. `rngs` holds a random generator for every environment of the
-    batch, and events in environment b draw only from `rngs[b]`. `reset`, `set_goal` and `advance`
-    write into `state`; all other arguments are read-only. `world` is the true state of the robot,
-    its hand and the objects. In shapes, B is the number of processed environments, O that of the
-    task's loose objects, W that of worker slots, and N that of robot joints.
+    batch, and environment b uses only `rngs[b]`. `reset`, `set_goal` and `advance` write into
+    `state`; all other arguments are read-only. `world` is the true state of the robot, its hand and
+    the objects. In shapes, B is the number of processed environments, O that of the task's loose
+    objects, W that of worker slots, and N that of robot joints.
 
     Args:
         config: settings of the task, of `config_type`; None for the defaults.
@@ -54,14 +54,15 @@ class Task(Generic[ConfigT, StateT]):
     rewards: ClassVar[tuple[RewardTerm, ...]] = ()
     """Reward terms of the task; their functions receive the task's settings as weights."""
     achieved: ClassVar[str] = ""
-    """Name in `info` of the number of successful attempts; "success" in tables is their
-    proportion."""
+    """Name in `info` of the number of successful attempts; "success" in tables is their fraction of
+    all attempts."""
     failed: ClassVar[str] = ""
     """Name in `info` of the number of failed attempts."""
     starts: ClassVar[str] = ""
-    """Description of the start of an episode, for the task's page."""
+    """Description of the start of an episode, for the task's documentation page."""
     ends: ClassVar[str] = ""
-    """Description of the end of an episode before its time limit, for the task's page."""
+    """Description of the conditions that end an episode before its time limit, for the task's
+    documentation page."""
     max_episode_steps: ClassVar[int] = EPISODE_STEPS
     """Time limit of an episode [control steps]."""
     robot: ClassVar[str | None] = None
@@ -73,9 +74,10 @@ class Task(Generic[ConfigT, StateT]):
     scene: ClassVar[str] = "lab"
     """Name of the default scene."""
     n_workers: ClassVar[int | tuple[int, int]] = 1
-    """Default number of workers, or the bounds (fewest, most) on the number in an episode."""
+    """Default number of workers, or a range (min, max) from which it is sampled for every
+    episode."""
     viewpoint: ClassVar[str] = "beside"
-    """Viewpoint of pictures, one of `scene.render.VIEWPOINTS`."""
+    """Name of the viewpoint of pictures, one of `scene.render.VIEWPOINTS`."""
     defaults: ClassVar[Mapping[str, Any]] = {}
     """Settings that differ from the defaults of `HRCConfig`, as a nested mapping like `config=`."""
     goal: ClassVar[Goal | None] = None
@@ -171,7 +173,7 @@ class Task(Generic[ConfigT, StateT]):
     def draw_start(
         self, rngs: Rngs, place: Any, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """Draw the initial joint positions (n, N) of n robots [rad, or m for slides].
+        """Return sampled initial joint positions (n, N) of n robots [rad, or m for slides].
 
         By default, they are near the home pose.
 
@@ -188,9 +190,9 @@ class Task(Generic[ConfigT, StateT]):
         return NOTHING
 
     def reach_targets(self) -> Sequence[ReachTarget]:
-        """Return targets that the tool has to reach, in addition to loose objects; none by default.
+        """Return the positions that the tool must reach, besides loose objects; none by default.
 
-        A robot that cannot reach them is rejected.
+        A robot that cannot reach all of them is rejected.
         """
         return ()
 
@@ -213,7 +215,7 @@ class Task(Generic[ConfigT, StateT]):
         )
 
     def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
-        """Replace the goals that `reset` drew for environments `ids`.
+        """Replace the goals that `reset` sampled for environments `ids`.
 
         Args:
             state: state of all environments; rows `ids` are written.
@@ -234,14 +236,14 @@ class Task(Generic[ConfigT, StateT]):
     def is_load(self, state: StateT) -> Bools | bool:
         """Return a mask (B, O) of the objects that count as part of the robot while they are held.
 
-        They count in cost, separation and belief. By default, all objects do.
+        Their surfaces are included in cost, separation and belief. By default, all objects count.
         """
         return True
 
     def signal(self, state: StateT) -> WorkerSignal | None:
         """Return the signal to workers that wait for the task (`Job.waits`).
 
-        The default, None, is for tasks without waiting workers.
+        The default, None, is for tasks for which no workers wait.
         """
         return None
 
@@ -259,7 +261,7 @@ class Task(Generic[ConfigT, StateT]):
 
     @property
     def description(self) -> str:
-        """The first paragraph of the class's docstring."""
+        """Description of the task: the first paragraph of the class's docstring."""
         return " ".join((getdoc(type(self)) or "").split("\n\n")[0].split())
 
     @property
@@ -284,7 +286,7 @@ class Task(Generic[ConfigT, StateT]):
         return overrides(type(self), "is_terminal")
 
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the numbers of attempts in an info by readable names.
+        """Return the numbers of attempts in an info, by human-readable name.
 
         An example is {"goals reached": 3.0, "goals missed": 1.0}.
         """
@@ -378,8 +380,9 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
 def ancestor_of(task: str, ids: Collection[str]) -> str:
     """Return the ID of a task with agents that can also act in a given task.
 
-    It is the task itself or its closest base class with the same observations and goals, as of
-    tasks made by `with_rewards`. If there is none among `ids`, return the ID of the task itself.
+    It is the task itself or its closest base class among `ids` with the same observations and
+    goals, such as the original of a task made by `with_rewards`. If `ids` contains neither, return
+    the ID of the task itself.
 
     Args:
         task: ID of the task.

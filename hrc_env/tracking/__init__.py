@@ -1,1 +1,1 @@
-"""Tracking: from the 2D keypoints of several cameras to a belief about each worker's joints."""
+"""Estimation of each worker's joints from the 2D keypoints of several cameras."""

@@ -34,27 +34,30 @@ N_PARAMETERS = 5
 """Number of parameters: translation along u and v [focal lengths], relative scaling, rotation [rad]
 and delay [s]."""
 KEPT = 0.96
-"""Share of the evidence that is kept from sample to sample; it is forgotten within 10 s."""
+"""Fraction of the evidence that is retained from one sample to the next. The corresponding time
+constant is 10 s."""
 NAMED_AT = 7.0
-"""Ratio above which a camera becomes suspected."""
+"""Likelihood ratio above which a camera becomes suspected."""
 CLEARED_AT = 3.5
-"""Ratio below which a suspected camera is cleared."""
+"""Likelihood ratio below which a suspected camera is cleared."""
 DECIDED = 1.3
-"""Factor by which the ratio of a camera must exceed all others before it is suspected, because the
-error of one camera also raises the ratios of the others."""
+"""Factor by which the ratio of a camera must exceed those of all others for it to be suspected. It
+is above 1 because the error of one camera also increases the ratios of the others."""
 SHIFT_COSTS = 3.0
-"""Penalty on the ratio of translation and scaling, relative to scaling alone."""
+"""Penalty on the likelihood ratio of the hypothesis of translation and scaling, relative to the
+hypothesis of scaling alone."""
 TURN_COSTS = 7.0
-"""Penalty on the ratio with rotation, because a leaning body resembles a rotated camera."""
+"""Penalty on the likelihood ratio of the hypothesis that includes rotation. It is larger because a
+leaning body resembles a rotated camera."""
 LEAST_CONFIDENCE = 0.5
 """Minimum confidence of a detection that is used."""
 CAUCHY = 0.7
 """Number of standard deviations at which a residual has half its weight. These Cauchy weights bound
 the evidence of a single view."""
 LEAST_VIEWS = 3
-"""Minimum number of cameras that must see a joint."""
+"""Minimum number of cameras that must see a joint for it to be used."""
 LEAST_DEPTH_M = 0.3
-"""Minimum depth of a joint in a camera that is used [m]."""
+"""Minimum depth of a joint in a camera at which the camera's detection is used [m]."""
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
 """Columns of a view of a joint: residuals of u and v [px], weight [1/px^2], and velocities of the
 joint along u and v [px/s]."""
@@ -64,9 +67,10 @@ JACOBIAN = 5
 PLACE = 11
 """First of two columns with the expected pixel [px]."""
 N_VIEW = 13
-"""Number of columns of a view."""
+"""Number of columns of a view of a joint."""
 EVERY = 10
-"""Number of updates between two samples; errors of the detector persist for about 12 updates."""
+"""Number of updates between two samples. It is similar to the number of updates, about 12, for
+which errors of the detector persist."""
 PRIOR = (0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2)
 """Prior precision of each parameter."""
 ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
@@ -74,7 +78,7 @@ ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
 
 
 class MonitoredCamera:
-    """The evidence for an error in the calibration of one camera of one environment."""
+    """Evidence for an error in the calibration of one camera of one environment."""
 
     updates: int
     """Number of updates since the reset."""
@@ -234,7 +238,7 @@ def _add_joint(
 
     Args:
         view: (C, N_VIEW) views of the joint.
-        sees: (C,) whether the view is used.
+        sees: (C,) mask of the views that are used.
         axes: (C, 3) principal point and focal length [px].
         cameras: (C,) evidence, increased in place.
         scratch: (N_PARAMETERS, N_PARAMETERS) work array.

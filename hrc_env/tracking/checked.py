@@ -24,9 +24,9 @@ METHODS = {
     "estimate": ("state",),
     "forecast": ("state", "horizon_s"),
 }
-"""Names of the methods of an `Estimator`, and of their arguments."""
+"""Argument names of each method of an `Estimator`, by the name of the method."""
 OFF_M2 = 1e-9
-"""Largest accepted asymmetry of a covariance [m^2]."""
+"""Maximum accepted asymmetry of a covariance [m^2]."""
 
 
 class CheckedEstimator(Generic[State]):

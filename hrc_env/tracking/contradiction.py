@@ -2,11 +2,11 @@
 
 A camera contradicts a track if most of its confident detections are farther from the track's joints
 than the detector's errors can explain. A single camera may do so briefly after it has swapped left
-and right labels, or while a track restarts. If several cameras do so persistently, they are not
-where their calibration says: they were moved, interchanged or mirrored.
+and right labels, or while a track restarts. If several cameras do so persistently, their
+poses differ from the calibration: they were moved, interchanged or mirrored.
 
 A track with a body that is far too small or too large explains no detection. If the calibration
-used other units, or a board of another size, all cameras agree on such a body.
+used wrong units or a board of the wrong size, all cameras agree on such a body.
 """
 
 import math
@@ -23,19 +23,19 @@ from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays
 from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 SEEN_WELL = 0.5
-"""Confidence from which a detected joint must be explained by a track."""
+"""Minimum confidence of a detected joint that a track must explain."""
 LEAST_JOINTS = 4
-"""Number of confident joints from which a pose must be explained by a track."""
+"""Minimum number of confident joints in a pose that a track must explain."""
 EXPLAINED_M = 0.15
-"""Distance across the line of sight within which a detection fits a track's joint [m]."""
+"""Maximum distance of a track's joint from the line of sight of a detection that fits it [m]."""
 SIGMAS = 4.0
-"""Distance within which a detection fits a track's joint, in standard deviations of the
+"""Maximum distance of a track's joint from a detection that fits it, in standard deviations of the
 detection."""
 SMALLEST_M = 0.95
-"""Total length of trunk, thigh and shank of the smallest person [m]. That of adults is 1.15 to
-1.55 m."""
+"""Total length of trunk, thigh and shank of the smallest plausible person [m]. The length is 1.15
+to 1.55 m for adults."""
 LARGEST_M = 1.8
-"""Total length of trunk, thigh and shank of the largest person [m]."""
+"""Total length of trunk, thigh and shank of the largest plausible person [m]."""
 CHAIN = tuple(JOINT[f"left_{name}"] for name in ("shoulder", "hip", "knee", "ankle"))
 """Indices of the left shoulder, hip, knee and ankle; the index of the right one is one higher."""
 
@@ -44,9 +44,9 @@ class DetectedPoses(NamedTuple):
     """Masks of the cameras that detect poses, and of those that detect unexplained poses."""
 
     poses: Bools
-    """(B, C) whether the camera detects a pose."""
+    """(B, C) mask of the cameras that detect a pose."""
     unexplained: Bools
-    """(B, C) whether the camera detects a pose that no track explains."""
+    """(B, C) mask of the cameras that detect a pose that no track explains."""
 
 
 def find_unexplained(

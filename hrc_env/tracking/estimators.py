@@ -4,9 +4,9 @@
 |---|---|
 | `particle` | the default: several hypotheses about a body, each a Gaussian on the kinematic tree |
 | `kalman` | `particle` with one hypothesis |
-| `paper` | the paper's Algorithm 1 as printed; its particles start anywhere in the area |
-| `paper_restarts` | `paper` with tracks that are started, repaired and ended as in the others |
-| `triangulation` | weighted least squares from all views of a frame; gaps keep the last position |
+| `paper` | the paper's Algorithm 1 as printed; its initial particles are spread over the area |
+| `paper_restarts` | `paper` with track initialization, joint reacquisition and track loss |
+| `triangulation` | weighted least squares from all views of a frame; gaps hold the last position |
 | `ransac` | `triangulation` from the views that agree |
 
 `smoother` is offline: `smoother.smooth` processes a whole clip (`OFFLINE`).
@@ -54,15 +54,15 @@ class EstimatorSpec:
     name: str
     """Name under which the estimator is registered and by which error messages refer to it."""
     make: Callable[[Floats, float, Any], Estimator[Any]]
-    """Function (P, ctrl_dt, config) that returns the estimator. Its arguments are the projections
-    (C, 3, 4) from the world [m] to pixels, the time between updates [s], and settings of the class
-    `config`."""
+    """Factory of the estimator, called as `make(P, ctrl_dt, config)`. The arguments are the
+    projections (C, 3, 4) from the world [m] to pixels, the time between updates [s], and settings
+    of the class `config`."""
     config: type[TrackerConfig] = TrackerConfig
     """Class of the settings that `make` takes."""
     needs_pairs: bool = False
     """Whether the estimator needs at least two cameras. If so, a frame that arrives alone, because
-    it is late or its camera has another rate, is accompanied by the last frames of the other
-    cameras."""
+    it is late or its camera has another frame rate, is processed together with the last frames of
+    the other cameras."""
     handles_late_frames: bool = False
     """Whether the estimator itself processes late frames at the time at which they were taken. If
     so, `update` receives frames as they arrive, once per control step, with their times in
@@ -71,7 +71,7 @@ class EstimatorSpec:
 
     @property
     def wants_pairs(self) -> str:
-        """Name of the estimator if it needs two cameras, else the empty string."""
+        """Name of the estimator if it needs at least two cameras, otherwise an empty string."""
         return self.name if self.needs_pairs else ""
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -107,11 +107,12 @@ ESTIMATORS = Registry(
         )
     },
 )
-"""Specs of the built-in and the registered estimators, by name."""
+"""Specifications of the built-in and the registered estimators, by name."""
 BUILT_IN = frozenset(ESTIMATORS.data.values())
-"""Specs of the built-in estimators; the results of all others are checked (`CheckedEstimator`)."""
+"""Specifications of the built-in estimators. The results of all other estimators are checked
+(`CheckedEstimator`)."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
-"""Calls that run the offline estimators on a whole clip, by the estimators' names."""
+"""Function calls that run each offline estimator on a whole clip, by the estimator's name."""
 EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
 """Type of the argument `estimator`: a name in `ESTIMATORS`, a spec, or a function like
 `EstimatorSpec.make`."""
@@ -155,7 +156,7 @@ def make_estimator(
     Args:
         estimator: a name in `ESTIMATORS`, an `EstimatorSpec`, or a function like its `make`.
         P: (C, 3, 4) projections from the world [m] to pixels.
-        ctrl_dt: usual time between two updates [s].
+        ctrl_dt: nominal time between two updates [s].
         config: settings of the estimator; None for the defaults. From settings of another
             estimator, only the fields of `TrackerConfig` are used.
 
@@ -188,13 +189,13 @@ def make_estimator(
 _DT_S = 0.04
 _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
                [[640.0, -900, 0, 0], [360, 0, -900, 0], [1, 0, 0, 3]]])  # fmt: skip
-"""(2, 3, 4) projections of two cameras that face the origin, for checks."""
+"""(2, 3, 4) projections of two cameras that face the origin. They are used to check estimators."""
 
 
 def check_estimator(spec: EstimatorSpec) -> None:
     """Raise `ConfigError` if an estimator is incomplete or returns invalid estimates.
 
-    Workers that no camera sees must have an estimate, too.
+    Workers that no camera sees must also have an estimate.
     """
     given = cast(object, spec)
     if not isinstance(given, EstimatorSpec):
@@ -288,7 +289,7 @@ def _check_same(spec: EstimatorSpec, one: PoseEstimate, other: PoseEstimate, mes
         spec: the estimator, for the error message.
         one: an estimate.
         other: an estimate that should be the same.
-        message: explanation of the fault, for the error message.
+        message: description of the fault, for the error message.
     """
     for name in ("mean_world", "cov_world", "velocity_world", "age_s", "tracked"):
         x, y = (np.asarray(getattr(each, name), float) for each in (one, other))

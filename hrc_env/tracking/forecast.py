@@ -1,10 +1,10 @@
 """Forecasts of the workers up to one second ahead, without further measurements.
 
-A small network, trained by `assets/ahead/train.py` on the environment's motions, takes one body in
-the frame of its heading. For a few horizons, it predicts the displacement of each joint and the
-standard deviation of its error, which is added to the current uncertainty. A body of unknown
-heading moves with constant velocity and random acceleration; a body that is not tracked relaxes to
-the prior (docs/tracking.md, "Forecast").
+A small network, trained by `assets/ahead/train.py` on the environment's motions, receives one body
+in the frame of its heading. For a few horizons, it predicts the displacement of each joint and the
+standard deviation of the prediction error, which is added to the current uncertainty. A body of
+unknown heading moves with constant velocity and random acceleration; a body that is not tracked
+relaxes to the prior (docs/tracking.md, "Forecast").
 """
 
 import functools
@@ -26,13 +26,13 @@ from hrc_env.tracking.tree.evidence import Heading, find_heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
-"""Longest horizon of a forecast [s]."""
+"""Maximum horizon of a forecast [s]."""
 N_INPUTS = 7 * N_JOINTS + 4
 """Number of the network's inputs; see `describe`."""
 _N_OUTPUTS = 4 * N_JOINTS
-"""Number of the network's outputs for one horizon: displacements and logarithmic deviations."""
+"""Number of the network's outputs for one horizon: displacements and log standard deviations."""
 _TORSO = (1, 2, 7, 8)
-"""Indices of shoulders and hips."""
+"""Indices of the joints of the torso: shoulders and hips."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
@@ -64,35 +64,35 @@ class Scratch(NamedTuple):
     """Activations of the network for one body."""
 
     inputs: Tensor
-    """(N_INPUTS,) inputs."""
+    """(N_INPUTS,) inputs of the network."""
     first: Tensor
-    """(n,) first hidden layer."""
+    """(n,) activations of the first hidden layer."""
     second: Tensor
-    """(m,) second hidden layer."""
+    """(m,) activations of the second hidden layer."""
     before: Tensor
-    """(60,) outputs for the last trained horizon before the requested one."""
+    """(60,) outputs for the last trained horizon that is shorter than the requested one."""
     after: Tensor
-    """(60,) outputs for the first trained horizon from the requested one on."""
+    """(60,) outputs for the first trained horizon that is not shorter than the requested one."""
 
 
 class Motion(NamedTuple):
     """The predicted motion of one body in the frame of its heading."""
 
     moved: Points3
-    """(J, 3) displacements [m]."""
+    """(J, 3) displacements of the joints [m]."""
     rate: Velocities3
-    """(J, 3) velocities [m/s]."""
+    """(J, 3) velocities of the joints at the end of the motion [m/s]."""
     std: Floats
     """(J,) standard deviations of the displacements [m]."""
 
 
 class Drift(NamedTuple):
-    """Parameters for the motion of bodies to which the network does not apply."""
+    """Parameters of the motion of bodies without a heading or without a track."""
 
     heading_m2: float
     """Variance added on each axis to a tracked body of unknown heading [m^2]."""
     keep: float
-    """Share of the deviation from the prior that a body without a track keeps."""
+    """Fraction of the deviation from the prior that remains for a body without a track."""
     prior_mean: tuple[float, float, float]
     """Mean of the prior position [m]."""
     prior_std: float
@@ -120,8 +120,8 @@ def describe(
 
     Args:
         points: (J, 3) joints in the world frame [m].
-        velocity: (J, 3) their velocities [m/s].
-        cov: (J, 3, 3) their covariances [m^2].
+        velocity: (J, 3) velocities of the joints [m/s].
+        cov: (J, 3, 3) covariances of the joints' positions [m^2].
         log_std: (2,) bounds of the logarithms of standard deviations.
         out: (N_INPUTS,) inputs, filled in.
     """
@@ -219,8 +219,8 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
     Args:
         now: current estimate in the world frame; it is not changed.
         horizon_s: time ahead, in (0, 1] [s].
-        config: settings of the estimator, with the prior, to which workers without a track relax,
-            and the bounds of the reported covariances.
+        config: settings of the estimator. They contain the prior, to which workers without a track
+            relax, and the bounds of the reported covariances.
 
     Returns:
         New arrays with the shapes of `now`: means [m], velocities [m/s] and covariances [m^2] at
@@ -316,8 +316,8 @@ def _apply_motion(
 
     Args:
         mean: (J, 3) joints [m].
-        cov: (J, 3, 3) their covariances [m^2].
-        velocity: (J, 3) their velocities [m/s].
+        cov: (J, 3, 3) covariances of the joints' positions [m^2].
+        velocity: (J, 3) velocities of the joints [m/s].
         heading: direction in which the body faces.
         motion: the predicted motion.
     """

@@ -11,22 +11,22 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 
 SAME_S = 5e-5
-"""Largest difference between two times that count as equal [s]."""
+"""Maximum difference between two times that are considered equal [s]."""
 _TICK_S = 1e-4
 """Resolution of times within a control step [s]; environments with equal times share a
 computation."""
 _TOGETHER_TICKS = 20
-"""Largest difference in time between frames of one set, in ticks: 2 ms, in which a walking person
-moves 3 mm."""
+"""Maximum difference in time between frames of one set, in ticks. It is 2 ms, in which a walking
+person moves 3 mm."""
 _END = 2**40
 """Tick that stands for the end of the step."""
 _NEVER = 2**41
 """Tick of a frame that was not taken within the step."""
 _HELD_S = 0.1
-"""Largest age of a frame that is reused with a newer frame of another camera [s]."""
+"""Maximum age of a frame that is reused with a newer frame of another camera [s]."""
 _DRIFT_PX_S = 300.0
-"""Speed of a walking person in the image, by which detections in a reused frame become less certain
-[px/s]."""
+"""Speed of a walking person in the image, which is the growth rate of the standard deviation of
+detections in a reused frame [px/s]."""
 
 
 class Frames(NamedTuple):
@@ -50,7 +50,7 @@ class FrameSet(NamedTuple):
     keypoints: Keypoints
     """(G, C, W, J, ...) keypoints; missing where a camera has no frame."""
     has: Bools
-    """(G, C) whether the camera has a frame."""
+    """(G, C) mask of the cameras with a frame in the set."""
     at_s: Floats
     """(G,) time of the frames [s]."""
 
@@ -110,13 +110,13 @@ def forget_frames(frames: Frames, ids: Ints) -> None:
 
 
 def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -> None:
-    """Store some frames in place of the oldest ones.
+    """Replace the oldest stored frames by new ones.
 
     Args:
         frames: the ring buffers, changed in place.
         keypoints: (B, C, W, J, ...) keypoints of one frame from each camera.
         time_s: (B, C) times at which the frames were taken [s].
-        use: (B, C) whether the frame is stored.
+        use: (B, C) mask of the frames to store.
     """
     b, c = np.nonzero(use)
     n = frames.n_taken[b, c] % frames.time_s.shape[2]
@@ -152,7 +152,7 @@ def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> It
 
 
 def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
-    """Complete a set with the last frames of other cameras for some workers; return its keypoints.
+    """Return the keypoints of a set, completed with other cameras' last frames for some workers.
 
     Two views that are slightly out of synchronisation locate a worker better than one view alone.
     The standard deviations of detections in an older frame grow by the distance that a walking
@@ -162,7 +162,7 @@ def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bool
         frames: the stored frames.
         ids: (G,) indices of the environments.
         frame_set: the set of frames.
-        wanted: (G, W) whether the worker needs the frames of other cameras.
+        wanted: (G, W) mask of the workers that need the frames of other cameras.
     """
     age_s = frame_set.at_s[:, None, None] - frames.time_s[ids]
     recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~frame_set.has[:, :, None]
@@ -196,7 +196,7 @@ def has_detections(keypoints: Keypoints) -> Bools:
 def _count_ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
     """Return the ticks (G, C, N) from the beginning of the step to each frame.
 
-    Frames at the end of the step have `_END`, and frames outside of the step have `_NEVER`.
+    The value is `_END` for frames at the end of the step and `_NEVER` for frames outside the step.
 
     Args:
         time_s: (G, C, N) times of the frames [s].
@@ -239,7 +239,7 @@ def _select_newest(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> Fra
     Args:
         frames: the stored frames.
         ids: (G,) indices of the environments.
-        among: (G, C, N) whether the frame may be selected.
+        among: (G, C, N) mask of the frames that may be selected.
         at_s: (G,) time of the set [s].
     """
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)

@@ -20,7 +20,7 @@ LEAST_NEW = 3
 
 
 class LastImage:
-    """Record of the last images of one camera in one environment."""
+    """Checksum of the last image of one camera in one environment, and number of new images."""
 
     total: float
     """Checksum of the keypoints in the last image that had keypoints; 0 before the first one."""
@@ -49,7 +49,7 @@ def leave_out_frozen(state: Records2[LastImage], ids: Ints, keypoints: Keypoints
     Args:
         state: (B, C) records of the whole batch.
         ids: (b,) indices of the environments to which the keypoints belong.
-        keypoints: (b, C, W, J) keypoints. Cameras without a new image must report none.
+        keypoints: (b, C, W, J) keypoints. They must be missing for cameras without a new image.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 

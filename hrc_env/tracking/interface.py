@@ -1,4 +1,4 @@
-"""Interface of the estimators, which turn keypoints of several cameras into poses of workers."""
+"""Interface of estimators, which compute workers' poses from the keypoints of several cameras."""
 
 from typing import Protocol, TypeVar
 
@@ -45,7 +45,7 @@ class Estimator(Protocol[State]):
         """Reset some environments to the state before any detection.
 
         Args:
-            state: as made by `init`; changed in place.
+            state: state returned by `init`; changed in place.
             ids: indices of the environments.
             rngs: one generator for each environment of the batch.
         """
@@ -57,7 +57,7 @@ class Estimator(Protocol[State]):
         Means move, covariances grow and ages increase.
 
         Args:
-            state: changed in place.
+            state: state to predict; changed in place.
             dt_s: time since the last call, above 0 [s]. It is a control step or, if cameras are
                 late or not synchronised, the part of a step up to the next frame.
             rngs: one generator for each environment of the batch.
@@ -70,11 +70,12 @@ class Estimator(Protocol[State]):
         Implementations must accept all keypoints, however implausible, without an error.
 
         Args:
-            state: changed in place.
-            keypoints: (B, C, W, J) in pinhole pixels, assigned to workers. A joint that was not
-                detected, and every joint of a camera without a frame, has NaN pixels, confidence 0
-                and infinite sigma. All frames were taken at the time up to which `predict` was
-                called; only estimators that handle late frames read `Keypoints.time_s`.
+            state: state to update; changed in place.
+            keypoints: (B, C, W, J) keypoints in pinhole pixels, assigned to workers. A joint that
+                was not detected, and every joint of a camera without a frame, has NaN pixels,
+                confidence 0 and infinite sigma. All frames were taken at the time up to which
+                `predict` was called; only estimators that handle late frames read
+                `Keypoints.time_s`.
             rngs: one generator for each environment of the batch.
         """
         ...

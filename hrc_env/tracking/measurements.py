@@ -28,17 +28,17 @@ from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW, Noise, Tree, View
 
 MIN_SIGMA_PX = 0.25
-"""Smallest standard deviation of a detection that is used [px]."""
+"""Lower bound of the standard deviations of detections [px]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 _MIRROR = tuple(int(j) for j in MIRROR)
-"""Index of the same joint on the other side of the body."""
+"""Index of each joint's counterpart on the other side of the body."""
 _UNSEEN_UPDATES = 8
-"""Number of updates without the worker after which a camera is trusted when the worker reappears.
-"""
+"""Number of updates without a detection after which a camera that sees the worker again is
+trusted."""
 _TRUSTED_UPDATES = 5
 """Number of updates for which a camera is trusted after the worker has reappeared."""
 _ENOUGH = 3
-"""Number of cameras with swapped labels from which the tracked body itself may be mirrored."""
+"""Number of seemingly swapped cameras from which the tracked body itself may be mirrored."""
 _AGAINST = 5.0
 """Upper bound of the other cameras' log-likelihood ratio against a mirrored body."""
 _LEAST_CHANCE = 1e-3
@@ -51,9 +51,9 @@ class KeypointArrays(NamedTuple):
     """The arrays of `Keypoints` that estimators read, as a tuple for compiled functions."""
 
     px: Points2
-    """(B, C, W, J, 2) pixels."""
+    """(B, C, W, J, 2) pixels of the keypoints."""
     confidence: Floats
-    """(B, C, W, J) confidence, 0 to 1."""
+    """(B, C, W, J) confidence of each keypoint, 0 to 1."""
     sigma_px: Floats
     """(B, C, W, J) standard deviation of each coordinate [px]."""
 
@@ -88,16 +88,16 @@ class Frame(NamedTuple):
     """
 
     cameras: Records1[Camera]
-    """(C,) cameras as calibrated."""
+    """(C,) calibrated cameras."""
     P: Floats
-    """(C, 3, 4) projections for the assumed poses of the cameras; the third row is the optical
-    axis."""
+    """(C, 3, 4) projections for the assumed poses of the cameras. The third row of each projection
+    contains the optical axis."""
     z: Points2
-    """(J, C, 2) pixels; 0 where there is no measurement."""
+    """(J, C, 2) measured pixels; 0 where there is no measurement."""
     sigma: Floats
     """(J, C) standard deviations of the pixels [px]; 1 where there is no measurement."""
     ok: Bools
-    """(J, C) whether there is a measurement."""
+    """(J, C) mask of the existing measurements."""
     belief: Floats
     """(J, C) probability that the measurement is an inlier."""
     views: Floats
@@ -112,11 +112,12 @@ class JointPixel(NamedTuple):
     """The predicted pixel of a joint in one camera."""
 
     u: float
-    """Column [px]."""
+    """Column of the pixel [px]."""
     v: float
-    """Row [px]."""
+    """Row of the pixel [px]."""
     depth: float
-    """Depth along the optical axis [m]; the pixel is invalid if it is at most `NEAREST_DEPTH_M`."""
+    """Depth along the optical axis [m]. The pixel is valid only if the depth exceeds
+    `NEAREST_DEPTH_M`."""
     spread: float
     """Variance of the pixel, averaged over both coordinates [px^2]."""
 
@@ -126,9 +127,9 @@ def is_measurement(u: float, v: float, confidence: float, sigma: float) -> bool:
     """Return whether a detection is valid as a measurement.
 
     Args:
-        u: column of its pixel [px].
-        v: row of its pixel [px].
-        confidence: its confidence.
+        u: column of the detected pixel [px].
+        v: row of the detected pixel [px].
+        confidence: confidence of the detection.
         sigma: standard deviation of each coordinate [px].
     """
     return (
@@ -160,7 +161,8 @@ def make_frame(cameras: Records1[Camera]) -> Frame:
 def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, frame: Frame) -> bool:
     """Fill in the measurements of one worker, and return whether there are any.
 
-    Missing measurements get pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+    For missing measurements, the pixel is set to 0 and sigma to 1 to keep NaN out of the
+    arithmetic.
 
     Args:
         measured: detections of all workers.
@@ -216,7 +218,7 @@ def project_joint(p: Floats, mean: Floats, cov: Floats) -> JointPixel:
     Args:
         p: (3, 4) projection of the camera.
         mean: (3+,) position of the joint [m].
-        cov: (3+, 3+) its covariance [m^2].
+        cov: (3+, 3+) covariance of the position [m^2].
     """
     x, y, z = mean[0], mean[1], mean[2]
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
@@ -237,7 +239,7 @@ def is_consistent(
         sigma: standard deviation of each coordinate [px].
         gate_sigma: the gate, in standard deviations.
         mean: (3+,) position of the joint [m].
-        cov: (3+, 3+) its covariance [m^2].
+        cov: (3+, 3+) covariance of the position [m^2].
     """
     u, v, depth, spread = project_joint(camera, mean, cov)
     if not depth > NEAREST_DEPTH_M:
@@ -273,7 +275,7 @@ def read_for_hypothesis(
         frame: measurements of the worker, filled in.
 
     Returns:
-        Whether the tracked body has left and right swapped, and not the cameras.
+        Whether left and right are swapped in the tracked body rather than by the cameras.
     """
     read_worker(measured, b, w, settings.sigma_scale, frame)
     scale_sigma(noise, frame.sigma)
@@ -282,7 +284,7 @@ def read_for_hypothesis(
 
 @kernel
 def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
-    """Multiply standard deviations (J, C) by the roots of the learnt variance factors, in place."""
+    """Multiply standard deviations (J, C) by the square roots of the learnt factors, in place."""
     for j in range(len(sigma)):
         for c in range(sigma.shape[1]):
             sigma[j, c] *= math.sqrt(noise[j, c].factor)
@@ -299,8 +301,8 @@ def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settin
         settings: settings of the estimator.
 
     Returns:
-        Whether the tracked body has left and right swapped instead. This is assumed if several
-        cameras seem to be swapped and the other cameras do not contradict.
+        Whether left and right are swapped in the tracked body instead. This is assumed if several
+        cameras seem to be swapped and the other cameras do not contradict it.
     """
     n_seeing, n_swapped, against = 0, 0, 0.0
     for c in range(len(views)):
@@ -393,7 +395,7 @@ def mirror(c: int, z: Points2, sigma: Floats, ok: Bools) -> None:
         c: index of the camera.
         z: (J, C, 2) pixels.
         sigma: (J, C) standard deviations [px].
-        ok: (J, C) whether there is a measurement.
+        ok: (J, C) mask of the existing measurements.
     """
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]

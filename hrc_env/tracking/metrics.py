@@ -16,15 +16,15 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.geometry.assignment import assign_rows
 
 SAME_M = 0.5
-"""Mean distance of joints within which a track matches a worker [m]: the gate that CLEAR MOT uses
-for people (Bernardin and Stiefelhagen 2008, doi:10.1155/2008/246309)."""
+"""Maximum mean distance of joints at which a track matches a worker [m]. It is the gate that CLEAR
+MOT uses for people (Bernardin and Stiefelhagen 2008, doi:10.1155/2008/246309)."""
 
 
 class Identity:
     """The tracking history of one worker, and of the slot with the same index, in an episode."""
 
     track: int
-    """Index of the slot with which the worker was matched last; -1 before the first match."""
+    """Index of the slot in the worker's most recent match; -1 before the first match."""
     matched: bool
     """Whether the worker was matched in the last step."""
     switches: int
@@ -81,16 +81,16 @@ def measure_errors(
     A match between a worker and a track is kept while they are within `SAME_M`. As many of the
     other workers and tracks as possible are matched within that distance, with the smallest sum of
     distances (CLEAR MOT). A worker matched with another slot than before counts as an identity
-    switch; if two workers swap their slots, that is two switches. IDF1 is 2 m / n. For it, each
-    worker is assigned to one slot for the whole episode; m is the number of steps in which assigned
-    pairs were within `SAME_M`, in the assignment that maximises this number; n is the number of
-    steps in which workers were present plus the number of steps in which slots had tracks (Ristani
-    et al. 2016, doi:10.1007/978-3-319-48881-3_2).
+    switch; two workers that exchange their slots count as two switches. IDF1 is 2 m / n. For it,
+    each worker is assigned to one slot for the whole episode; m is the number of steps in which
+    assigned pairs were within `SAME_M`, in the assignment that maximises this number; n is the
+    number of steps in which workers were present plus the number of steps in which slots had tracks
+    (Ristani et al. 2016, doi:10.1007/978-3-319-48881-3_2).
 
     Args:
         estimate: (B, W, ...) tracks.
         joints_world: (B, W, J, 3) true joints [m].
-        present: (B, W) whether the worker is present.
+        present: (B, W) mask of the workers that are present.
         identities: matches since the episodes began, changed in place.
 
     Returns:
@@ -146,7 +146,7 @@ def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> 
 
     Args:
         off_m: (W, W) distance of each worker from each track [m].
-        tracked: (W,) whether the slot has a track.
+        tracked: (W,) mask of the slots with a track.
         cost: (W, W) work array.
         chosen: (W,) work array.
     """
@@ -197,7 +197,7 @@ def _match_workers(off_m: Floats, workers: Records1[Identity], cost: Floats, cho
 
 @kernel
 def _compute_idf1(near: Ints, workers: Records1[Identity], cost: Floats, chosen: Ints) -> float:
-    """Return the IDF1 of an episode; NaN without workers and tracks.
+    """Return the IDF1 of an episode; NaN if there were neither workers nor tracks.
 
     Args:
         near: (W, W) number of steps in which each worker and each track were within `SAME_M`.

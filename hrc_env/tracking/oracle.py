@@ -1,8 +1,8 @@
 """Estimates without cameras: the ground truth and the prior.
 
-This is the only module that turns ground truth into an estimate (perception level `truth`, for
-teaching and for upper bounds). The prior is the estimate at the level `none`, and that of every
-estimator before the first detection.
+This is the only module that converts ground truth into an estimate (perception level `truth`, which
+serves for teaching and for upper bounds on performance). The prior is the estimate at the level
+`none`, and that of every estimator before the first detection.
 """
 
 from dataclasses import replace
@@ -14,11 +14,12 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.tracks import copy_estimate, make_tracks
 
 ORACLE_STD_M = 1e-3
-"""Standard deviation reported with the truth [m]: small, but with invertible covariances."""
+"""Standard deviation reported with the truth [m]. It is small, but the covariances remain
+invertible."""
 
 
 def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
-    """Return the truth as an estimate (B, W, J, ...) in which all workers are tracked at age 0."""
+    """Return the truth as an estimate (B, W, J, ...) with all workers tracked and all ages 0."""
     shape = truth.joints_world.shape[:-1]
     return PoseEstimate(
         mean_world=truth.joints_world.copy(),
@@ -30,7 +31,7 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
 
 
 def estimate_absence(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:
-    """Return the estimate for environments that are known to be without people.
+    """Return the estimate for environments that are known to contain no people.
 
     Args:
         batch: number of environments B.

@@ -38,7 +38,7 @@ from hrc_env.tracking.interface import Estimator, State
 IGNORED = ("no time", "future", "not newer", "too old")
 """Reasons for ignoring frames, in the order of the last axis of `LateState.ignored`."""
 _AHEAD_S = 1e-3
-"""Time by which a frame may be ahead of the clock and still count as current [s]."""
+"""Maximum time by which a frame may be ahead of the clock to count as current [s]."""
 
 
 class LateState(NamedTuple, Generic[State]):
@@ -72,8 +72,8 @@ class LateState(NamedTuple, Generic[State]):
 class OutOfSequence(Generic[State]):
     """Wrapper that accepts late frames up to `max_delay_s`; see `tracking.estimators.Estimator`.
 
-    It stores a copy of the inner state for every control step within that time, which takes
-    megabytes for the estimator `paper`.
+    The wrapper stores a copy of the inner state for every control step within that time, which
+    requires several megabytes for the estimator `paper`.
     """
 
     inner: Estimator[State]
@@ -81,10 +81,10 @@ class OutOfSequence(Generic[State]):
     n_cameras: int
     """Number of cameras."""
     ctrl_dt: float
-    """Usual time between two predictions [s]. With more frequent predictions, the stored states
+    """Nominal time between two predictions [s]. With more frequent predictions, the stored states
     cover a shorter time."""
     max_delay_s: float
-    """Age beyond which frames are ignored [s]."""
+    """Maximum age of frames that are processed [s]; older ones are ignored."""
     needs_pairs: bool = False
     """Whether the inner estimator needs at least two cameras. If so, a frame that arrives alone is
     accompanied by the last frames of the other cameras."""
@@ -129,7 +129,7 @@ class OutOfSequence(Generic[State]):
         self.inner.predict(state.now, dt_s, rngs)
 
     def update(self, state: LateState[State], keypoints: Keypoints, rngs: Rngs) -> None:
-        """Update the state with frames, each at the time at which it was taken."""
+        """Update the state with each frame at the time at which the frame was taken."""
         batch, n_workers = len(state.clock_s), state.frames.keypoints.px.shape[3]
         shape = (batch, self.n_cameras, n_workers, N_JOINTS)
         check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
@@ -171,7 +171,7 @@ class OutOfSequence(Generic[State]):
         Args:
             state: changed in place.
             keypoints: (B, C, W, J) keypoints.
-            use: (B, C) whether the frame is used.
+            use: (B, C) mask of the frames to use.
             rngs: one generator for each environment of the batch.
         """
         if use.all():
@@ -196,7 +196,8 @@ class OutOfSequence(Generic[State]):
             ids: (n,) indices of the environments.
             age: 1 for the step that ends at the present time (the open slot), 2 for the step before
                 it, and so on.
-            rngs: one generator for each environment of the batch, which draw new random numbers.
+            rngs: one generator for each environment of the batch, which generate new random
+                numbers.
         """
         n_slots = state.end_s.shape[1]
         slots = (state.slot[ids] - age + 1) % n_slots
@@ -217,9 +218,10 @@ class OutOfSequence(Generic[State]):
     def _use_frames(
         self, part: State, state: LateState[State], ids: Ints, frame_set: FrameSet, rngs: Rngs
     ) -> None:
-        """Update with a set of frames, and with the last frames of other cameras if needed.
+        """Update states with a set of frames, and with the last frames of other cameras if needed.
 
-        These are added for workers without a track, or for all workers if `needs_pairs`.
+        The latter are added for workers without a track, or for all workers if `needs_pairs` is
+        true.
 
         Args:
             part: states of the environments, changed in place.
@@ -258,15 +260,15 @@ class OutOfSequence(Generic[State]):
 
 
 def _snap_to_present(time_s: Floats, now_s: Floats) -> Floats:
-    """Return times (B, C) in which those that almost equal the current time are set to it [s]."""
+    """Return times (B, C) [s] in which values almost equal to the current time are set to it."""
     near = (time_s > now_s - SAME_S) & (time_s < now_s + _AHEAD_S)
     return np.where(near, now_s, time_s)
 
 
 def _list_ends(state: LateState[Any]) -> Floats:
-    """Return the ends (B, K - 1) of the steps 1, 2, ... slots ago [s].
+    """Return the times (B, K - 1) at which the steps 1, 2, ... slots ago ended [s].
 
-    Steps whose state cannot be restored have -inf.
+    The time is -inf for steps with a state that cannot be restored.
     """
     n_slots = state.end_s.shape[1]
     age = np.arange(1, n_slots, dtype=np.int64)
@@ -312,7 +314,7 @@ def _select_usable(
 
 
 def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
-    """Return the rows of slots in the arrays of `_flatten_slots`.
+    """Return the row of one slot of each environment in the arrays of `_flatten_slots`.
 
     Args:
         state: the whole state.

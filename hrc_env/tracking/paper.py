@@ -16,9 +16,9 @@ interpreted as follows:
 
 The other fields of the estimate do not affect the particles. A joint's age is the time since a
 detection was consistent with its cloud. A worker becomes `tracked` once `acquire_min_joints` joints
-have age 0, and stays so while any age is below `lost_after_s`. Velocities are filtered differences
-of the means, and 0 before a worker is tracked. `paper_restarts` adds the steps that the listing
-lacks.
+have age 0, and remains tracked while any age is below `lost_after_s`. Velocities are filtered
+differences of the means, and 0 before a worker is tracked. `paper_restarts` adds track
+initialization, joint reacquisition and track loss, which the listing does not define.
 """
 
 import math
@@ -46,12 +46,13 @@ from hrc_env.tracking.tracks import Track, make_tracks, report_tracks, reset_tra
 from hrc_env.tracking.tree.update import count_conflict
 
 BEHIND = -1e12
-"""Log-likelihood of a particle behind a camera that detected the joint; it all but excludes the
-particle."""
+"""Log-likelihood of a particle behind a camera that detected the joint. The value practically
+excludes the particle."""
 HEIGHTS_M = (0.0, 2.2)
-"""Bounds of z of the initial particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
+"""Bounds of z for the initial particles if `PaperConfig.initial_bounds_m` is empty [m]."""
 _NARROWEST_M = 1.0
-"""Minimum extent of the camera positions along an axis for bounding the initial particles [m]."""
+"""Minimum extent of the camera positions along an axis on which they bound the initial particles
+[m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +69,12 @@ class PaperState:
 
 @dataclass(frozen=True, slots=True)
 class PaperEstimator:
-    """Algorithm 1 for every worker; see `tracking.estimators.Estimator`."""
+    """Estimator that applies Algorithm 1 to every worker; see `tracking.estimators.Estimator`."""
 
     P: Floats
     """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
-    """Usual time between two updates [s]."""
+    """Nominal time between two updates [s]."""
     config: PaperConfig
     """Settings of the algorithm."""
 
@@ -86,7 +87,7 @@ class PaperEstimator:
         return state
 
     def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
-        """Draw uniform clouds for environments `ids` (line 1, initialize_particle(M))."""
+        """Sample uniform clouds for environments `ids` (line 1, initialize_particle(M))."""
         reset_tracks(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
         place = find_place(self.P, self.config)
@@ -131,7 +132,7 @@ class PaperEstimator:
 
         Args:
             state: changed in place.
-            moving: (B, W) whether the worker's particles are moved.
+            moving: (B, W) mask of the workers with particles to move.
             dt_s: time that passes [s].
             rngs: (B,) one generator for each environment.
         """
@@ -173,10 +174,11 @@ class PaperEstimator:
 
 
 def find_place(P: Floats, config: PaperConfig) -> Floats:
-    """Return the bounds (3, 2) of x, y and z within which the initial particles are drawn [m].
+    """Return the bounds (3, 2) of x, y and z within which initial particles are sampled [m].
 
-    If the settings give no bounds, they are those of the cameras' positions. Along an axis on which
-    the cameras are too close to each other, they are two standard deviations about the prior mean.
+    If the settings contain no bounds, the bounds are those of the cameras' positions. Along an axis
+    on which the cameras are too close to each other, they are two standard deviations about the
+    prior mean.
 
     Args:
         P: (C, 3, 4) projections.
@@ -248,7 +250,7 @@ def count_support(tracks: Records2[Track], b: int, w: int, frame: Frame, gate_si
 
 
 def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
-    """Move particles by Gaussian steps, in place.
+    """Add a random Gaussian step to the position of each particle, in place.
 
     Args:
         particles: (J, 3, M) positions [m].
@@ -327,7 +329,7 @@ def normalise(log_weights: Floats, weights: Floats) -> None:
 
 @kernel(makes_arrays=True)
 def draw_multinomial(weights: Floats, waits: Floats, ancestors: Ints) -> None:
-    """Draw M independent indices with given probabilities, in ascending order.
+    """Sample M independent indices with given probabilities, in ascending order.
 
     The normalised cumulative sums of M + 1 standard exponential variates are M sorted uniform
     variates (Devroye, Non-Uniform Random Variate Generation, V.3).

@@ -1,9 +1,9 @@
-"""Algorithm 1 with steps that its listing lacks, which start, repair and end tracks.
+"""Algorithm 1 extended with track initialization, joint reacquisition and track loss.
 
-A cloud starts around a triangulated point, which `tree.acquisition` finds. A joint restarts if two
-views have agreed on another position for `conflict_frames` updates. A worker that no detection
-supports is lost, and the estimate relaxes to the prior. Between these events, the clouds evolve as
-in `paper`.
+The published listing does not define these steps. A cloud starts around a triangulated point, which
+`tree.acquisition` finds. The cloud of a joint restarts if two views have agreed on another position
+for `conflict_frames` updates. A worker that no detection supports is lost, and the estimate relaxes
+to the prior. Between these events, the clouds evolve as in `paper`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from hrc_env.tracking.tree.acquisition import find_again, find_body
 
 @dataclass(frozen=True, slots=True)
 class PaperRestarts(PaperEstimator):
-    """Algorithm 1 with restarts, for every worker; see `tracking.estimators.Estimator`."""
+    """Estimator that applies Algorithm 1 with restarts; see `tracking.estimators.Estimator`."""
 
     def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
         """Reset environments `ids` to the prior; `rngs` is not used."""

@@ -31,23 +31,23 @@ from hrc_env.tracking.tree.state import Hypotheses, Tree, Work, make_hypotheses,
 
 @dataclass(frozen=True, slots=True)
 class ParticleEstimator:
-    """Rao-Blackwellised particle filter; see `tracking.estimators.Estimator`."""
+    """Estimator by Rao-Blackwellised particle filtering; see `tracking.estimators.Estimator`."""
 
     P: Floats
     """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
-    """Usual time between two updates [s]."""
+    """Nominal time between two updates [s]."""
     config: ParticleConfig
     """Settings of the estimator."""
     cameras: Records1[Camera] = field(init=False, repr=False)
     """(C,) cameras of the projections `P`."""
     settings: Settings = field(init=False, repr=False)
-    """Settings as a named tuple, for compiled functions."""
+    """Settings as a named tuple, which compiled functions accept."""
     noise_model: NoiseModel = field(init=False, repr=False)
     """Constants for learning the measurement noise."""
 
     def __post_init__(self) -> None:
-        """Derive the arguments of compiled functions."""
+        """Compute the fields that compiled functions take as arguments."""
         object.__setattr__(self, "cameras", cameras_of(self.P))
         object.__setattr__(self, "settings", make_settings(self.config))
         object.__setattr__(self, "noise_model", make_noise_model(self.config, self.ctrl_dt))
@@ -99,24 +99,31 @@ class ParticleEstimator:
         return self._widen(state, mixture)
 
     def _widen(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
-        """Widen covariances for unknown body sizes and misaligned cameras; return the estimate.
+        """Add errors that the hypotheses do not represent, and return the bounded estimate.
 
-        A worker with a track started from one view may be larger and, by the same factor,
-        farther from that camera. A worker seen by two misaligned cameras may be displaced as a
-        whole.
+        Two errors displace all joints of a worker together. If two cameras are misaligned, the
+        whole body may be displaced; the covariance of this displacement is added to that of every
+        joint. If the track was started from one view, the body may be larger and, by the same
+        factor, farther from the camera; every joint then has an error along its ray, proportional
+        to its distance from the camera. Finally, the covariances are bounded by the settings.
 
         Args:
-            state: the hypotheses.
+            state: the hypotheses, of which the heaviest (index 0 of axis H) is read.
             estimate: (B, W, ...) estimate, changed in place.
         """
-        size_std = np.where(estimate.tracked, state.trees["size_std"][:, :, 0], 0.0)
-        is_misaligned = estimate.tracked & state.trees["pair"]["is_misaligned"][:, :, 0]
+        heaviest, views = state.trees[:, :, 0], state.views[:, :, 0]  # (B, W) and (B, W, C)
+        # (B, W) relative error of body size and distance; 0 once two cameras agree
+        size_std = np.where(estimate.tracked, heaviest["size_std"], 0.0)
+        is_misaligned = estimate.tracked & heaviest["pair"]["is_misaligned"]  # (B, W)
         if not (size_std.any() or is_misaligned.any()):
             return estimate
-        displaced_m2 = state.trees["displaced_m2"][:, :, 0]
-        estimate.cov_world[is_misaligned] += displaced_m2[is_misaligned][:, None]
-        centres = -np.linalg.solve(self.P[:, :, :3], self.P[:, :, 3:])[..., 0]
-        centre = centres[state.views["unseen_updates"][:, :, 0].argmin(-1)]
-        grown = size_std[..., None, None] * (estimate.mean_world - centre[:, :, None])
-        estimate.cov_world[...] += grown[..., :, None] * grown[..., None, :]
+
+        displacement_cov = heaviest["displaced_m2"][is_misaligned]  # (n, 3, 3) for n such workers
+        estimate.cov_world[is_misaligned] += displacement_cov[:, None]  # the same for all J joints
+
+        camera_centres = -np.linalg.solve(self.P[:, :, :3], self.P[:, :, 3:])[..., 0]  # (C, 3)
+        last_camera = views["unseen_updates"].argmin(-1)  # (B, W) camera that saw the worker last
+        rays = estimate.mean_world - camera_centres[last_camera][:, :, None]  # (B, W, J, 3)
+        radial_std = size_std[..., None, None] * rays  # (B, W, J, 3) vector of length one sigma
+        estimate.cov_world[...] += radial_std[..., :, None] * radial_std[..., None, :]
         return bound_estimate(estimate, self.config)

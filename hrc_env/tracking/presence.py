@@ -1,4 +1,4 @@
-"""Presence of people in workers' slots without a track.
+"""Inference about the presence of people in workers' slots without a track.
 
 Absence is inferred for patches of floor on which cameras would detect a person (`Coverage`). It
 relies on searches of whole images by the cameras. For a worker's slot without a track, each patch
@@ -8,14 +8,14 @@ has one of three states:
   enough in succession without finding an untracked person, and at least as many cameras still find
   none.
 - `PROBABLY_EMPTY`: at least one camera that sees the patch has found no untracked person in
-  `SEVERAL` searches. A single camera proves no more, because about 2 % of workers are hidden from
-  it at first.
+  `SEVERAL` searches. A single camera cannot prove absence, because about 2 % of workers are
+  initially hidden from it.
 - `POSSIBLE`: there were too few searches, the cameras that see the patch provide no images or
   frozen ones, no camera sees the patch, or a camera shows an untracked person.
 
 The slot is *absent* if every patch is empty, and *unknown* otherwise. A lost worker may be hidden
 at the last estimated position. Therefore no patch becomes empty until the worker is tracked again,
-or until that estimate is forgotten (after `FORGOTTEN` time constants `lost_relaxation_s` without a
+or until that estimate has expired (after `FORGOTTEN` time constants `lost_relaxation_s` without a
 measurement) and searches find no person. A search expires after `lost_after_s`, as a track does.
 """
 
@@ -45,21 +45,21 @@ from hrc_env.tracking.contradiction import DetectedPoses
 LEAST_CAMERAS = 2
 """Minimum number of cameras that must search to prove absence."""
 IMAGES = 8
-"""Number of searches by all cameras together that prove absence if every image is searched whole; a
-subset of the cameras needs a proportional number. Each of 2,000 workers was found in the first
-images of four cameras."""
+"""Number of searches by all cameras together that prove absence if the whole of every image is
+searched. For a subset of the cameras, the number is proportionally smaller. In a test, each of
+2,000 workers was found in the first images of four cameras."""
 SEARCHES = 24
 """Number of searches that prove absence, as for `IMAGES`, if whole images are searched only
-occasionally. The first two searches missed one worker of 180, and six found 400 of 400
-(tests/properties guarantees 90 %)."""
+occasionally. In tests, the first two searches missed one worker of 180, and six searches found 400
+of 400 (tests/properties guarantees 90 %)."""
 SEVERAL = 3
 """Number of searches without a person after which a patch of floor is probably empty."""
 FORGOTTEN = 3.0
 """Time without a measurement after which the position of a lost worker is forgotten, as a multiple
 of `lost_relaxation_s`."""
 REPEATED = 2
-"""Number of successive images that must show an unexplained person, because the detector
-occasionally mistakes the robot for a person."""
+"""Number of successive images that must show an unexplained person. One image is not enough because
+the detector occasionally mistakes the robot for a person."""
 CONTRADICTED = 6
 """Number of successive images with an unexplained person, in several cameras, that contradict the
 calibration."""
@@ -73,23 +73,24 @@ class Slot:
     absent: bool
     """Whether it is known that the slot has no person."""
     lost: bool
-    """Whether the slot has or had a track whose position is not forgotten."""
+    """Whether the slot has a track, or has lost one and its last position is not forgotten yet."""
     unobserved_s: float
     """Time since the cameras last saw the worker, or last found the floor empty [s]."""
     seen_world: Annotated[Points3, (N_JOINTS, 3)]
-    """Estimated joints when a camera last saw the worker [m]; NaN if no camera has."""
+    """Estimated positions of the joints when a camera last saw the worker [m]; NaN if no camera has
+    seen the worker."""
 
 
 SLOT = dtype_of(Slot)
 
 
 class SearchCount:
-    """Record of the searches by one camera for one slot."""
+    """Successive searches by one camera that found no person for one slot."""
 
     empty: int
     """Number of successive searches that found no person for the slot."""
     since_s: float
-    """Age of the image of the last of these searches [s]."""
+    """Age of the image in the last of these searches [s]."""
 
 
 SEARCH_COUNT = dtype_of(SearchCount)
@@ -107,26 +108,26 @@ class PresenceArrays(NamedTuple):
     age_s: Floats
     """(B, W) age of the oldest search on which the levels are based [s]."""
     cameras: Bools
-    """(G, C) whether the camera sees the group of patches; not changed."""
+    """(G, C) mask of the cameras that see each group of patches; not changed."""
 
 
 class Evidence(NamedTuple):
     """The tracks and the searches in one update of `b` environments."""
 
     tracked: Bools
-    """(b, W) whether the worker is tracked."""
+    """(b, W) mask of the tracked workers."""
     age_s: Floats
-    """(b, W) age of the worker's youngest joint [s]."""
+    """(b, W) smallest age of the worker's joints [s]."""
     mean_world: Points3
-    """(b, W, J, 3) estimated joints [m]."""
+    """(b, W, J, 3) estimated positions of the joints [m]."""
     found: Floats
     """(b, C, W, J) confidence of the detections before association with workers."""
     assigned: Floats
     """(b, C, W, J) confidence of the detections after association."""
     has_strangers: Bools
-    """(b,) whether there may be a person without a slot."""
+    """(b,) mask of the environments in which there may be a person without a slot."""
     searched: Bools
-    """(b, C) whether the camera searched its whole image."""
+    """(b, C) mask of the cameras that searched their whole image."""
     image_age_s: Floats
     """(b, C) age of the camera's image [s]."""
     enough: int
@@ -143,11 +144,11 @@ class PresenceReport(NamedTuple):
     """The fields of a `PoseEstimate` that an update of presence fills in."""
 
     unknown: Bools
-    """(b, W) whether the slot may have a person without a track."""
+    """(b, W) mask of the slots that may have a person without a track."""
     unobserved_s: Floats
     """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
     seen_world: Points3
-    """(b, W, J, 3) estimated joints when a camera last saw the worker [m]."""
+    """(b, W, J, 3) estimated positions of the joints when a camera last saw the worker [m]."""
 
 
 class FloorState(NamedTuple):
@@ -164,7 +165,7 @@ class ImageSearches:
     """The searches of whole images in one update of B environments."""
 
     whole: Bools
-    """(B, C) whether a camera searched its whole image."""
+    """(B, C) mask of the cameras that searched their whole image."""
     age_s: Floats
     """(B, C) age of the camera's image [s]."""
     enough: int
@@ -180,7 +181,7 @@ class Presence(Stateful):
 
     Args:
         batch: number of environments B.
-        n_workers: number of slots W in each.
+        n_workers: number of slots W in each environment.
         coverage: the patches of floor, and the cameras that see each of them.
     """
 
@@ -199,7 +200,7 @@ class Presence(Stateful):
         self.strangers = np.zeros((batch, cameras.shape[1]), np.int64)
         """(B, C) number of successive images in which a camera showed an unexplained person."""
         self.doubt = np.zeros(batch, np.int64)
-        """(B,) number of further updates for which no track is trusted."""
+        """(B,) number of further updates for which all tracks are distrusted."""
         self.others = no_others(batch)
         """Detected people without a slot."""
         self.forget(np.arange(batch))
@@ -361,7 +362,7 @@ def _judge_floor(
         slot: the slot.
         search: (C,) searches for the slot.
         level: (G,) state of each group of patches of floor, changed in place.
-        cameras: (G, C) whether the camera sees the group.
+        cameras: (G, C) mask of the cameras that see each group.
         shown: whether a camera shows a person for the slot.
         evidence: the tracks and the searches of the update.
 
@@ -391,7 +392,7 @@ def _judge_group(
 
     Args:
         search: (C,) searches for the slot.
-        sees: (C,) whether the camera sees the group.
+        sees: (C,) mask of the cameras that see the group.
         level: current state of the group.
         enough: number of searches by all cameras that prove absence.
         shown: whether a camera shows a person for the slot.
@@ -423,7 +424,7 @@ def _copy_points(points: Points3, out: Points3) -> None:
 
 @kernel
 def _forget_place(slot: Slot) -> None:
-    """Forget the lost track of a slot and its last position, in place."""
+    """Discard the lost track of a slot and its last position, in place."""
     slot.lost = False
     for j in range(N_JOINTS):
         for i in range(3):
@@ -432,7 +433,7 @@ def _forget_place(slot: Slot) -> None:
 
 @kernel
 def _is_shown(confidence: Floats) -> bool:
-    """Return whether any joint has a positive confidence (J,)."""
+    """Return whether any of the confidences (J,) is positive."""
     most = 0.0
     for value in confidence:
         most = max(most, value)

@@ -1,4 +1,4 @@
-"""Offline smoothing of a whole clip, as an upper bound for estimators.
+"""Offline smoothing of a whole clip, as an upper bound on the accuracy of estimators.
 
 The filter on the kinematic tree runs through the clip with one hypothesis. A Rauch-Tung-Striebel
 pass (AIAA Journal 3, 1965) then runs backwards with the linear motion model, on all 90 coordinates
@@ -41,9 +41,9 @@ class Moments(NamedTuple):
     """The means and covariances of n Gaussians in d dimensions."""
 
     mean: Floats
-    """(n, d) means."""
+    """(n, d) means of the Gaussians."""
     cov: Floats
-    """(n, d, d) covariances."""
+    """(n, d, d) covariances of the Gaussians."""
 
 
 class LinearMotion(NamedTuple):
@@ -59,21 +59,21 @@ class _FilteredFrame(NamedTuple):
     """The state of the filter at one frame, for n = B W workers."""
 
     predicted: Floats
-    """(n, 90) means before the frame."""
+    """(n, 90) predicted means, before the update with the frame."""
     mean: Floats
-    """(n, 90) means after the frame."""
+    """(n, 90) means after the update with the frame."""
     cov: Floats
-    """(n, J, 6, 6) marginal covariances of the joints after the frame."""
+    """(n, J, 6, 6) marginal covariances of the joints after the update."""
     slope: Floats
-    """(n, J, 6, 6) slopes of the joints on their parents after the frame; see `tree.gaussian`."""
+    """(n, J, 6, 6) slopes of the joints on their parents after the update; see `tree.gaussian`."""
     displaced_m2: Floats
     """(n, 3, 3) covariance of the displacement of the whole body [m^2]."""
     age_s: Floats
     """(n, J) ages of the joints [s]."""
     tracked: Bools
-    """(n,) whether the worker is tracked."""
+    """(n,) mask of the tracked workers."""
     follows: Bools
-    """(n,) whether the track continues from the previous frame."""
+    """(n,) mask of the workers with a track that continues from the previous frame."""
 
 
 class _Smoothed(NamedTuple):
@@ -88,7 +88,7 @@ class _Smoothed(NamedTuple):
     age_s: Floats
     """(T, n, J) ages of the joints [s]."""
     tracked: Bools
-    """(T, n) whether the worker was tracked."""
+    """(T, n) mask of the tracked workers."""
 
 
 def smooth(
@@ -234,7 +234,7 @@ def _filter_clip(
 
 
 def _get_moments(frame: _FilteredFrame) -> Moments:
-    """Return the moments of all 90 coordinates of the bodies after a frame."""
+    """Return the moments of all 90 coordinates of the bodies after the update with a frame."""
     return Moments(frame.mean.copy(), expand_covariance(frame.cov, frame.slope))
 
 

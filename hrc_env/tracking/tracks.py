@@ -14,7 +14,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.settings import Settings, make_settings
 
 _ROUNDING = 1e-6
-"""Tolerance of the smallest eigenvalue, as a fraction of the largest variance."""
+"""Tolerance for the smallest eigenvalue, as a fraction of the largest variance."""
 
 
 class Track:
@@ -49,7 +49,7 @@ class EstimateArrays(NamedTuple):
     age_s: Floats
     """(B, W, J) time since a measurement last supported the joint [s]."""
     tracked: Bools
-    """(B, W) whether the worker is tracked."""
+    """(B, W) mask of the tracked workers."""
 
 
 def get_estimate_arrays(estimate: PoseEstimate) -> EstimateArrays:
@@ -69,7 +69,7 @@ def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Records2[T
     Args:
         batch: number of environments B.
         n_workers: number of workers W in each environment.
-        config: settings that contain the prior and the largest age.
+        config: settings that contain the prior and the maximum age.
     """
     tracks = make_records(Track, (batch, n_workers))
     reset_tracks(tracks, np.arange(batch), config)
@@ -82,7 +82,7 @@ def reset_tracks(tracks: Records2[Track], ids: Ints, config: TrackerConfig) -> N
     Args:
         tracks: (B, W) tracks of the whole batch.
         ids: indices of the environments to reset.
-        config: settings that contain the prior and the largest age.
+        config: settings that contain the prior and the maximum age.
     """
     fresh = np.zeros((), TRACK)
     fresh["mean_world"] = config.prior_mean_world
@@ -138,8 +138,8 @@ def age_worker(
 
     Args:
         mean: (J, 3) positions [m], relaxed in place if the worker is not tracked.
-        cov: (J, 3, 3) covariances [m^2], relaxed likewise.
-        velocity: (J, 3) velocities [m/s], relaxed likewise.
+        cov: (J, 3, 3) covariances [m^2], relaxed in the same way.
+        velocity: (J, 3) velocities [m/s], relaxed in the same way.
         age: (J,) ages [s], increased in place.
         conflict: (J,) counts of contradictions, set to zero if the worker is not tracked.
         tracked: whether the worker was tracked before.
@@ -158,7 +158,7 @@ def age_worker(
 
 @kernel
 def count_up(age: Floats, dt: float, max_age: float) -> float:
-    """Increase ages and return the smallest [s].
+    """Increase the ages of joints and return the smallest age [s].
 
     Args:
         age: (J,) ages [s], changed in place.
@@ -187,7 +187,7 @@ def relax(
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances [m^2].
         velocity: (J, 3) velocities [m/s].
-        keep: share of the deviation from the prior that is kept.
+        keep: fraction of the deviation from the prior that remains.
         prior_mean: mean of the prior position [m].
         prior_std: standard deviation of the prior on each axis [m].
     """
@@ -206,7 +206,7 @@ def copy_estimate(tracks: Records2[Track]) -> PoseEstimate:
 
 
 def report_tracks(tracks: Records2[Track], config: TrackerConfig) -> PoseEstimate:
-    """Return the estimate of tracks (B, W), with covariances within the configured bounds."""
+    """Return the estimate of tracks (B, W), with the covariances bounded as configured."""
     return bound_estimate(copy_estimate(tracks), config)
 
 

@@ -1,4 +1,4 @@
-"""Estimators that triangulate each frame, and keep the last position of a joint through gaps.
+"""Estimators that triangulate each frame and hold the last position of a joint during gaps.
 
 `triangulation` is weighted least squares from all views. `ransac` uses the views that agree, which
 it finds by trying every pair of cameras (after Fischler and Bolles, Comm. ACM 24, 1981). A joint
@@ -25,16 +25,16 @@ from hrc_env.tracking.tree.acquisition import complete_body, keep_one_body
 
 @dataclass(frozen=True, slots=True)
 class TriangulationEstimator:
-    """Estimator that triangulates each frame on its own; see `tracking.estimators.Estimator`."""
+    """Estimator that triangulates each frame independently; see `tracking.estimators.Estimator`."""
 
     P: Floats
     """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
-    """Usual time between two updates [s]."""
+    """Nominal time between two updates [s]."""
     config: TriangulationConfig
     """Settings of the estimator."""
     gate_sigma: float = 0.0
-    """Gate for the agreement of views, in standard deviations; with 0, all views are used."""
+    """Maximum residual at which views agree, in standard deviations. With 0, all views are used."""
 
     def init(self, batch: int, n_workers: int) -> Records2[Track]:
         """Return the tracks (B, W) of workers that have never been detected."""
@@ -115,7 +115,7 @@ def _update(
     Args:
         tracks: (B, W) tracks.
         made: (B, W, J, 3) triangulated points [m]; NaN where there is none.
-        cov: (B, W, J, 3, 3) their covariances [m^2].
+        cov: (B, W, J, 3, 3) covariances of the points [m^2].
         settings: settings of the estimator.
         velocity_tau: time constant of the filter on velocities [s].
     """
@@ -146,8 +146,8 @@ def _update_track(
     Args:
         track: the track.
         points: (J, 3) points [m].
-        spread: (J, 3, 3) their covariances [m^2].
-        found: (J,) whether the joint has a new point.
+        spread: (J, 3, 3) covariances of the points [m^2].
+        found: (J,) mask of the joints with a new point.
         velocity_tau: time constant of the filter on velocities [s].
     """
     mean, velocity, age = track.mean_world, track.velocity_world, track.age_s

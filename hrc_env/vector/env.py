@@ -4,8 +4,7 @@ import gymnasium, hrc_env
 envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
 
 Environment k equals `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of
-environments and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same
-environments.
+environments and threads. Results have the form of those of gymnasium's `SyncVectorEnv`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,13 +50,13 @@ from hrc_env.vector.pictures import LISTS, Pictures
 from hrc_env.vector.shards import Shards
 
 Step: TypeAlias = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
-"""Result of a step, in the form of gymnasium."""
+"""Observation, rewards, terminated, truncated and infos of a step, as in gymnasium."""
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]
 ):
-    """A vector environment: robots that step together, each with its own workers.
+    """A vector environment: a batch of robots, each with separate workers, that step together.
 
     Environment k after `reset(seed=s)` equals the single environment after `reset(seed=s + k)`, bit
     for bit. Actions are (num_envs, A), observations (num_envs, n).
@@ -66,12 +65,12 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         num_envs: number of environments.
         max_episode_steps: time limit [control steps]; None for the task's limit, -1 for no limit.
         autoreset_mode: when an environment is reset after the end of an episode: in the next step
-            (default), in the same step, or never ("Disabled").
+            (the default), in the same step, or never ("Disabled").
         num_threads: number of threads that share the environments; None for all cores.
-        arguments: fields of `EnvConfig`. perception is "keypoints" (default), "truth" or "none", as
-            images have no batched form. With the suffix "_list" of a render mode, `render` returns
-            every environment's pictures of all steps since the last `render` or the start of the
-            episode.
+        arguments: fields of `EnvConfig`. `perception` is "keypoints" (the default), "truth" or
+            "none", because images are not rendered in batches. If the render mode has the suffix
+            "_list", `render` returns the pictures of all steps since the last `render` or the start
+            of the episode, for each environment.
 
     Raises:
         ConfigError: a name, index or value is not valid; the error names the valid ones.
@@ -103,7 +102,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if self.render_mode in LISTS:
             self.metadata["render_modes"].append(self.render_mode)
         self.arguments = arguments if self.render_mode else _without_pictures(arguments)
-        """Arguments for `HRCEnv`, as given by the user."""
+        """Arguments for `HRCEnv` that the user has passed, without those that concern pictures if
+        there is no render mode."""
         self.num_envs = check_integer("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
@@ -115,7 +115,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._streams = [seeding.np_random() for _ in range(self.num_envs)]
-        """Random generator of each environment, and its seed."""
+        """Random generator and seed of each environment."""
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
         limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = parse_time_limit(limit)
@@ -123,11 +123,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
         self._options: list[dict[str, Any]] = [{}] * self.num_envs
-        """Fixed parts of all future episodes, for each environment."""
+        """Options that fix parts of all future episodes, for each environment."""
         self._fixed: list[Fixed | None] = [None] * self.num_envs
-        """Checked form of `_options`, for each environment."""
+        """Parsed form of `_options`, for each environment."""
         self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        """Attributes that users have set, for each environment."""
+        """Attributes that users have set with `set_attr`, for each environment."""
 
     def reset(
         self,
@@ -135,20 +135,20 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | ResetOptions | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start episodes of all environments, or of some.
+        """Start episodes of all or of some environments.
 
         Args:
-            seed: environment k gets `seed + k`, or the k-th of a list; with None its random stream
-                continues.
+            seed: environment k is seeded with `seed + k`, or with the k-th entry of a list. With
+                None, its random stream continues.
             options: options by name. "reset_mask", (num_envs,) bool, selects the environments that
-                start an episode. "steps_left", an int or (num_envs,) int, is the number of steps
-                after which these episodes are truncated at the latest; alternatively,
-                "elapsed_steps", (num_envs,) int, is the number of steps of the time limit that have
-                passed. The other fields of `ResetOptions` fix parts of the episodes; "each" is a
-                list with a mapping of fields for each environment.
+                start an episode. "steps_left", an int or (num_envs,) int, is the maximum number of
+                steps of these episodes; alternatively, "elapsed_steps", (num_envs,) int, is the
+                number of steps of the time limit that have already passed. The other fields of
+                `ResetOptions` fix parts of the episodes; "each" is a list with a mapping of such
+                fields for each environment.
 
         Returns:
-            Observations of all environments, and infos of those that started.
+            Observations of all environments, and infos of those that have started an episode.
 
         Raises:
             ConfigError: an option is invalid; in that case no episode is started.
@@ -178,8 +178,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     def step(self, actions: NDArray[np.float32]) -> Step:
         """Advance every environment by one control step.
 
-        In the mode NEXT_STEP, environments whose episode has just ended are reset instead, and
-        their actions are ignored.
+        In the autoreset mode NEXT_STEP, environments with an episode that ended in the previous
+        step are reset instead, and their actions are ignored.
 
         Args:
             actions: (num_envs, A) actions in [-1, 1].
@@ -208,13 +208,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return copy_arrays(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Decode the indices in infos to words: activities, bodies, contacts and cameras.
+        """Convert indices in infos to names of activities, bodies, contacts and cameras.
 
         Args:
             infos: infos of `reset` or `step`.
 
         Returns:
-            Arrays (num_envs,) of tuples of words, by the names in docs/reference/infos.md.
+            Arrays (num_envs,) of tuples of names, by the keys in docs/reference/infos.md.
         """
         return words_of_infos(infos, self.num_envs, self.shards.first.bodies.names)
 
@@ -222,7 +222,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """Fix parts of all future episodes in every environment, until the next call.
 
         Args:
-            options: options of `reset`, including "each"; None fixes nothing.
+            options: options of `reset`, including "each"; None removes all fixed parts.
 
         Raises:
             ConfigError: an option is invalid, or is permitted for a single reset only.
@@ -236,7 +236,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._options, self._fixed = each, fixed
 
     def get_state(self) -> State:
-        """Return a copy of the whole state, including the options of `set_options`."""
+        """Return a copy of the complete state, including the options from `set_options`."""
         return {**super().get_state(), "options": copy_arrays(self._options)}
 
     def set_state(self, state: State) -> None:
@@ -245,7 +245,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.set_options({"each": copy_arrays(state["options"])})
 
     def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Raise the `ConfigError` that a reset of environment `k` would raise for these options."""
+        """Raise `ConfigError` if a reset of environment `k` would reject these options."""
         given = named_options(options, *ALONE)
         count_elapsed_steps({n: given.pop(n) for n in ALONE if n in given}, self.max_episode_steps)
         self.shards.first.fix({**self._options[k], **given})
@@ -255,7 +255,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return dict(self._options[k])
 
     def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Fix parts of all future episodes of environment `k` alone."""
+        """Fix parts of all future episodes of the single environment `k`."""
         given = lasting_options(options)
         fixed = self.shards.first.fix(given) if given else None
         self._options = [given if b == k else each for b, each in enumerate(self._options)]
@@ -269,12 +269,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             part.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> tuple[Any, ...] | None:  # type: ignore[override]
-        """Return every environment's picture, or its list of pictures, by the render mode.
+        """Return the picture, or in list modes the list of pictures, of every environment.
 
-        The pictures are drawn one after the other, which is slow.
+        The pictures are rendered one after the other, which is slow.
 
         Args:
-            camera: camera of the pictures, as for `HRCEnv.render`; must be None for lists.
+            camera: camera of the pictures, as for `HRCEnv.render`; must be None if lists are
+                returned.
 
         Raises:
             ConfigError: the camera does not exist.
@@ -285,14 +286,15 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(self.pictures.of(k, camera) for k in range(self.num_envs))
 
     def member(self, k: int) -> Member:
-        """Return the interface of environment `k` alone."""
+        """Return the interface of the single environment `k`."""
         return Member(self, k)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Return the result of a method, or the value of an attribute, of every environment.
 
         Args:
-            name: name of the method or attribute; the methods `TOGETHER` are called once.
+            name: name of the method or attribute; the methods in `member.TOGETHER` are called only
+                once.
             args: arguments of the method.
             kwargs: keyword arguments of the method.
         """
@@ -302,15 +304,15 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(each(*args, **kwargs) if callable(each) else each for each in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of every environment, as `Member` has it."""
+        """Return the value of an attribute of `Member` for every environment."""
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set a user's attribute of every environment, as an attribute of `Member`.
+        """Set a user-defined attribute of `Member` for every environment.
 
         Args:
             name: name of the attribute.
-            values: a value for all environments, or a list or tuple with one for each.
+            values: a value for all environments, or a list or tuple with one value for each.
         """
         each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
         check_shape(
@@ -321,7 +323,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def simulation(self) -> Simulation:
-        """Simulation of the environments; the first one if there are several."""
+        """Simulation of the environments; the first simulation if there are several."""
         return self.shards.first
 
     @property
@@ -340,7 +342,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(seed for _, seed in self._streams)
 
     def set_stream(self, k: int, stream: np.random.Generator) -> None:
-        """Set the random generator of environment `k`, whose seed is unknown (-1)."""
+        """Set the random generator of environment `k`, and its seed to -1 (unknown)."""
         if not isinstance(stream, np.random.Generator):
             raise ConfigError(f"np_random must be a numpy.random.Generator, got {stream!r}.")
         self._streams[k] = stream, -1
@@ -403,7 +405,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return arguments without those that concern pictures."""
+    """Return the arguments without those that concern pictures."""
     names = ("render_mode", "width", "height", "render_markers", "overlay")
     return {name: value for name, value in arguments.items() if name not in names}
 
@@ -417,7 +419,7 @@ def _fix_episodes(
     """Return the fixed parts of the episodes of environments `ids`.
 
     Args:
-        simulation: a simulation with their settings.
+        simulation: a simulation with the settings of the environments.
         ids: (n,) indices of the environments.
         lasting: options of all resets for each of the B environments.
         each: options of one reset for each of the B environments.

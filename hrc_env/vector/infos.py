@@ -1,7 +1,7 @@
-"""Infos of many environments: an array for each name, with a mask of the environments that have it.
+"""Infos of many environments: an array for each name, with a mask of the environments with a value.
 
-The layout is that of gymnasium's `VectorEnv._add_info`. Names are the same in every step; where the
-mask is false, an environment has no info in this step, and the value is 0.
+The layout is that of gymnasium's `VectorEnv._add_info`. The names are the same in every step. If an
+environment has no info in a step, its mask is False and its value is 0.
 """
 
 import warnings
@@ -23,7 +23,7 @@ from hrc_env.step_result import StepResult
 
 @dataclass(frozen=True, slots=True)
 class InfoTable:
-    """Named values of B environments."""
+    """Infos of B environments, by name."""
 
     values: dict[str, Floats]
     """Numbers (B,) by name; NaN for an environment without a value."""
@@ -34,7 +34,7 @@ class InfoTable:
             self.values[name][ids] = values
 
     def arrays(self, mask: Bools) -> InfoDict:
-        """Return values and masks by name; environments outside the mask (B,) have no values."""
+        """Return values and masks by name. Only the environments in the mask (B,) have values."""
         infos = InfoDict()
         for name, values in publish(self.values).items():
             infos[name] = np.where(mask, values, np.zeros_like(values))
@@ -43,11 +43,11 @@ class InfoTable:
 
 
 def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
-    """Return the infos of some environments as a table of all environments.
+    """Return a table of all environments that contains the infos of some of them.
 
     Args:
         result: result of environments `ids`.
-        ids: indices of these environments.
+        ids: indices of the environments in the result.
         batch: number of all environments, B.
     """
     table = InfoTable({name: _fill(batch, values) for name, values in result.info.items()})
@@ -56,14 +56,14 @@ def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 
 
 def _fill(batch: int, values: NDArray[Any]) -> NDArray[Any]:
-    """Return an array (B,) of missing values with the type of `values`: NaN, or -1 for integers."""
+    """Return an array (B,) of missing values (NaN, or -1 for integers) of the dtype of `values`."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
 
 
 def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the names of infos that match patterns.
 
-    The names are those of a small environment with the given arguments.
+    The available names are found by making a small vector environment with the given arguments.
 
     Args:
         patterns: names, or patterns of names such as "safety/*".
@@ -89,7 +89,7 @@ def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
 def words_of_infos(
     infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
 ) -> dict[str, NDArray[np.object_]]:
-    """Decode the indices in the infos of a batch to words.
+    """Convert indices in the infos of a batch to names.
 
     Args:
         infos: arrays (num_envs,) by name.
@@ -97,7 +97,7 @@ def words_of_infos(
         bodies: names of the workers' bodies.
 
     Returns:
-        Arrays (num_envs,) of tuples of words, by name.
+        Arrays (num_envs,) of tuples of names, by the key of the info.
     """
     words = words_of(bodies)
     numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}

@@ -21,7 +21,8 @@ from hrc_env.vector.infos import words_of_infos
 from hrc_env.vector.options import split_options
 
 PROCESSES_PER_CORE = 2
-"""Maximum number of processes per core; more renderers and networks are no faster."""
+"""Maximum number of processes per core; a greater number does not increase the throughput of
+renderers and networks."""
 REFUSING = ("check_options", "set_options", "set_reward")
 """Methods of `HRCEnv` that raise errors for invalid arguments."""
 
@@ -36,9 +37,10 @@ def raise_first_error(results: Iterable[Any]) -> tuple[Any, ...]:
 
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
-    """Environments at level "pixels", with one process for each.
+    """Vector environment at perception level "pixels", with one process per environment.
 
-    Errors in options and rewards are raised in the calling process, and the environments continue.
+    Errors in options and reward weights are raised in the calling process, and the environments
+    remain usable.
     """
 
     def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
@@ -78,7 +80,7 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         super().call_async(*attempt, name, *args, **kwargs)
 
     def call_wait(self, timeout: float | None = None) -> tuple[Any, ...]:
-        """Return the results of the calls that were started.
+        """Return the results of the calls started by `call_async`.
 
         Args:
             timeout: time after which `TimeoutError` is raised [s]; None for no limit.
@@ -89,15 +91,15 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         return raise_first_error(super().call_wait(timeout))
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Decode the indices in infos to words, as `HRCVectorEnv.words` does."""
+        """Convert indices in infos to names, as `HRCVectorEnv.words` does."""
         return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
 
     def _set_next_options(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:
-        """Set the options of each environment's next reset, or of none if one raises an error.
+        """Set the options of the next reset of each environment; if any is invalid, set none.
 
         Args:
             each: options for each environment.
-            lasting: whether they hold for all future resets.
+            lasting: whether the options apply to all future resets.
         """
         super().set_attr("next_options", list(each))
         try:
@@ -115,7 +117,8 @@ def make_vector(
     Args:
         num_envs: number of environments.
         perception: perception level, as for `HRCEnv`.
-        force: whether more than two processes per core are permitted with "pixels".
+        force: whether more than `PROCESSES_PER_CORE` processes per core are permitted with
+            "pixels".
         kwargs: arguments of `HRCVectorEnv`; "pixels" does not accept `num_threads`.
 
     Returns:

@@ -35,17 +35,19 @@ ALIKE = (
     "max_episode_steps",
     "render_mode",
 )
-"""Attributes of the vector environment that are the same for every environment."""
+"""Names of attributes of the vector environment that are the same for every environment."""
 TOGETHER = ("close", "set_reward")
 """Methods that can only be called for all environments together."""
 TAKEN = {*inspect.signature(HRCEnv).parameters, *dir(HRCEnv), *ALIKE, "simulation", "views"}
-"""Names of an environment's attributes and arguments, which users' attributes must not have."""
+"""Names of attributes and arguments of an environment, which user-defined attributes must not
+have."""
 
 
 class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
     """Interface of environment `k` of a vector environment: attributes, pictures and resets.
 
-    It can step only together with the others. The vector environment stores users' attributes.
+    The environment can only step together with the others. The vector environment stores attributes
+    that users set.
 
     Args:
         vector: the vector environment.
@@ -61,7 +63,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Start an episode of this environment.
 
         Args:
-            seed: seed of its random stream; with None the stream continues.
+            seed: seed of the environment's random stream; with None, the stream continues.
             options: options of `HRCEnv.reset`, or "elapsed_steps".
         """
         alone = np.arange(self._vector.num_envs) == self._k
@@ -86,13 +88,13 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """Faults of this episode's cameras, each with its drawn severity."""
+        """Faults of this episode's cameras, each with its sampled severity."""
         simulation, b = self._vector.shards.locate(self._k)
         return simulation.cameras.faults_of(b)
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of all future episodes by name; they can be set."""
+        """Options of all future episodes, by name. The property can be set."""
         return self._vector.options_of(self._k)
 
     @options.setter
@@ -104,7 +106,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._vector.set_options_of(self._k, options)
 
     def render(self, camera: CameraChoice = None) -> Any:
-        """Return a picture of this environment, or for a list mode those since the last call.
+        """Return a picture, or in list modes the pictures since the last call, of this environment.
 
         Args:
             camera: camera of the picture, as for `HRCEnv.render`.
@@ -113,7 +115,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._vector.pictures.of(self._k, camera)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """Return the cameras' images with crops, keypoints and estimated skeletons, tiled."""
+        """Return a mosaic of the cameras' images with crops, keypoints and estimated skeletons."""
         self._vector.refuse_closed()
         return self._vector.pictures.mosaic(self._k)
 
@@ -133,13 +135,13 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def metadata(self) -> dict[str, Any]:  # type: ignore[override]
-        """Metadata of one environment, without `autoreset_mode`."""
+        """Metadata of one environment; `autoreset_mode` is not included."""
         metadata = self._vector.metadata
         return {name: value for name, value in metadata.items() if name != "autoreset_mode"}
 
     @property
     def render_mode(self) -> str | None:  # type: ignore[override]
-        """Render mode of every environment."""
+        """Render mode, which is the same for all environments."""
         return self._vector.render_mode
 
     @property

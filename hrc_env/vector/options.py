@@ -21,13 +21,15 @@ from hrc_env.env import ENDLESS
 from hrc_env.reset_options import ResetOptions, named_options
 
 MAX_ENVS = 16_384
-"""Maximum number of environments; more would need gigabytes of memory and be no faster."""
+"""Maximum number of environments. More environments need gigabytes of memory without being
+faster."""
 ALONE = ("steps_left", "elapsed_steps")
-"""Options of a reset that may differ between environments, in addition to `ResetOptions`."""
+"""Options of a reset that may differ between environments, in addition to the fields of
+`ResetOptions`."""
 ROWS = {"goal": 1, "start_q": 1, "n_workers": 0, "steps_left": 0, "elapsed_steps": 0}
-"""Options that may be arrays with one row per environment, and the number of axes of a row."""
+"""Number of axes of one row of each option that may be an array with one row per environment."""
 OF_VECTORS = ("reset_mask", "elapsed_steps", "each")
-"""Options of a reset that only vector environments accept."""
+"""Reset options that only vector environments accept."""
 
 
 def parse_time_limit(max_episode_steps: int) -> int:
@@ -62,7 +64,7 @@ def parse_threads(num_threads: int | None) -> int:
 
 
 def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return a list with the seed, or None, of each environment."""
+    """Return the seed of each environment, or None if its random stream continues."""
     if seed is None:
         return [None] * num_envs
     if isinstance(seed, (int, np.integer)):
@@ -86,7 +88,7 @@ class ParsedOptions:
     elapsed_steps: Ints
     """Number of steps of the time limit that have passed (B,)."""
     each: list[dict[str, Any]]
-    """Fixed parts of each environment's episode, by name."""
+    """Options of each environment that fix parts of its episode, by name."""
 
 
 def read_options(
@@ -97,7 +99,7 @@ def read_options(
     Args:
         options: options as a record or a mapping.
         num_envs: number of environments.
-        max_episode_steps: time limit of episodes.
+        max_episode_steps: time limit of episodes [control steps].
 
     Raises:
         ConfigError: an option is unknown or invalid.
@@ -120,8 +122,8 @@ def split_options(
 ) -> list[dict[str, Any]]:
     """Return the options of each environment by name.
 
-    They are combined from values for all environments, arrays with one row per environment, and the
-    list "each". If all environments have the same options, they share one dictionary.
+    The options are combined from values for all environments, arrays with one row per environment,
+    and the list "each". If the options of all environments are equal, they share one dictionary.
 
     Args:
         options: options as a record or a mapping.
@@ -157,7 +159,7 @@ def split_options(
 
 
 def _has_rows(name: str, value: Any, num_envs: int) -> bool:
-    """Return whether a value has a row for each environment.
+    """Return whether an option is an array with one row per environment.
 
     Raises:
         ConfigError: the number of rows is wrong.
@@ -173,11 +175,11 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
 
 
 def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
-    """Return the number of steps of one environment's time limit that have passed.
+    """Return the number of elapsed steps of the time limit of a single environment.
 
     Args:
         options: "steps_left" or "elapsed_steps" of the environment.
-        max_episode_steps: time limit of the environment.
+        max_episode_steps: time limit of the environment [control steps].
 
     Raises:
         ConfigError: an option is unknown or invalid.
@@ -189,7 +191,7 @@ def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: in
 
 
 def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) -> Ints:
-    """Return the number of elapsed steps (B,), from "steps_left" or "elapsed_steps"."""
+    """Return the number of elapsed steps (B,) from the option "steps_left" or "elapsed_steps"."""
     if "elapsed_steps" in steps and "steps_left" in steps:
         raise ConfigError("elapsed_steps and steps_left are equivalent: give only one of them.")
     if "steps_left" in steps:
@@ -202,7 +204,7 @@ def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) ->
 
 
 def _mask(mask: Any, num_envs: int) -> Bools:
-    """Return a valid mask (B,) of the environments to reset, or raise `ConfigError`."""
+    """Return a mask (B,) of the environments to reset, or raise `ConfigError` if it is invalid."""
     if not isinstance(mask, np.ndarray) or mask.dtype != bool:
         raise ConfigError(
             'options["reset_mask"] must be a NumPy array of bool, one for each environment, such '
@@ -215,7 +217,7 @@ def _mask(mask: Any, num_envs: int) -> Bools:
 
 
 def _steps(name: str, value: Any, num_envs: int, low: int, high: int) -> Ints:
-    """Return numbers of steps (B,) from `low` to `high`, or raise `ConfigError`."""
+    """Return numbers of steps (B,), or raise `ConfigError` if any is not from `low` to `high`."""
     steps = np.asarray(value)
     check_shape(name, steps.shape, (num_envs,), "one for each environment")
     is_whole = np.issubdtype(steps.dtype, np.integer)

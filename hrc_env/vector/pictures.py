@@ -1,4 +1,4 @@
-"""Pictures of many environments: of the current step, or of all steps since the last `render`."""
+"""Pictures of many environments, of the current step or of all steps since the last `render`."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -17,22 +17,22 @@ LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
 
 
 class LocatedView(NamedTuple):
-    """Views of the shard that contains an environment."""
+    """The views of the shard that contains an environment, and its index in the shard."""
 
     view: Views
-    """Views of that shard."""
+    """Views of the shard."""
     b: int
     """Index of the environment in the shard."""
 
 
 class Pictures:
-    """Renderer of the environments of shards.
+    """Renderer of pictures of the environments in shards.
 
     Args:
         shards: simulations of the environments.
-        render_mode: form of the pictures; None for none.
+        render_mode: form of the pictures; None if no pictures are rendered.
         size: width and height of the pictures [px].
-        shown: arguments `markers` and `capsules` of `Views.picture`.
+        shown: the arguments `markers` and `capsules` of `Views.picture`, by name.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Pictures:
         return self._draw(k, camera)
 
     def mosaic(self, k: int) -> NDArray[np.uint8]:
-        """Return the cameras' images of environment `k` with crops and skeletons, tiled."""
+        """Return a mosaic of the cameras' images of environment `k` with crops and skeletons."""
         view, b = self._locate(k)
         return view.mosaic(b)
 
@@ -83,7 +83,7 @@ class Pictures:
         """Add a picture of the current step to the lists, in the modes `LISTS`.
 
         Args:
-            mask: (B,) mask of the environments whose picture is added.
+            mask: (B,) mask of the environments for which a picture is added.
             is_first: (B,) whether the step is the first of an episode, which clears the list.
         """
         if self.render_mode not in LISTS:
@@ -104,6 +104,6 @@ class Pictures:
         return view.picture(is_depth, b, self.size, camera=camera, **self.shown)
 
     def _locate(self, k: int) -> LocatedView:
-        """Return the views of environment `k`'s shard, and the environment's index there."""
+        """Return the views of the shard with environment `k`, and the environment's index in it."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
         return LocatedView(self.views[shard], k - self.bounds[shard])

@@ -20,7 +20,7 @@ from hrc_env.step_result import StepResult, concatenate_results
 
 
 class Located(NamedTuple):
-    """Simulation that contains an environment, and the environment's index there."""
+    """The simulation that contains an environment, and the environment's index in it."""
 
     simulation: Simulation
     """The simulation that contains the environment."""
@@ -29,7 +29,7 @@ class Located(NamedTuple):
 
 
 class Shards:
-    """Environments in several simulations, the first of which runs in the calling thread.
+    """Environments in several simulations; the first simulation runs in the calling thread.
 
     Args:
         batch: number of environments.
@@ -53,11 +53,11 @@ class Shards:
 
         Args:
             ids: (n,) sorted indices of the environments.
-            rngs: random generators of these n environments.
-            fixed: fixed parts of each episode; empty for none.
+            rngs: random generators of the n environments.
+            fixed: fixed parts of each episode; empty if nothing is fixed.
 
         Returns:
-            The result of these environments, with n rows.
+            The result of the n environments that are reset.
         """
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
@@ -69,7 +69,7 @@ class Shards:
         return concatenate_results(_collect(jobs))
 
     def locate(self, k: int) -> Located:
-        """Return the simulation of environment `k`, and the environment's index there."""
+        """Return the simulation that contains environment `k`, and the index within it."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
         return Located(self.parts[shard], k - self.bounds[shard])
 
@@ -115,10 +115,10 @@ class Shards:
 
 
 def _collect(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
-    """Return the results of jobs; once all have ended, raise the first error if there is one.
+    """Return the results of jobs. If any has failed, raise the first error once all have ended.
 
     Args:
-        jobs: pairs of the index of a job's first environment and the job.
+        jobs: pairs (index of a job's first environment, job).
     """
     results, errors = list[StepResult](), list[BaseException]()
     for first, job in jobs:

@@ -36,8 +36,8 @@ class CostEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
 class CostVectorEnv(VectorWrapper):
     """A vector environment in which `step` returns six values, the cost (B,) as the third.
 
-    At the end of an episode it is the cost of the last step, even if the next episode begins in the
-    same step.
+    At the end of an episode, the returned cost is that of the last step, even if the next episode
+    begins in the same step.
     """
 
     def __init__(self, env: VectorEnv) -> None:

@@ -1,1 +1,1 @@
-"""Bodies of workers: measurements, surfaces, and props in the hands."""
+"""Bodies of workers, with measurements, surfaces for rendering, and held props."""

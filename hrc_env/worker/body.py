@@ -1,4 +1,4 @@
-"""The worker's body: 22 segments, 15 joints and the capsules around them.
+"""Body of a worker, with 22 segments, 15 joints and the capsules around them.
 
 The data are read from `assets/workers/<name>.npz`, written by `assets/workers/bake.py`. In the rest
 frame x is forward, y left, z up, with the origin on the floor below the pelvis; at rest all
@@ -34,22 +34,22 @@ PARENT: Ints = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Measurements of one worker, or of N workers along a leading axis; lengths are in metres."""
+    """Measurements of one worker, or of N workers along a leading axis."""
 
     names: tuple[str, ...]
     """Names of the workers."""
     stature_m: Floats
-    """Stature (...,) barefoot, without the hat [m]."""
+    """Stature (...,) without shoes and hat [m]."""
     rest_position: Points3
     """Origins (..., S, 3) of the segments at rest [m]."""
     joint_segment: Ints
-    """Segment (J,) that carries each of the 15 joints."""
+    """Index (J,) of the segment to which each of the 15 joints is fixed."""
     joint_offset: Points3
     """Position (..., J, 3) of each BlazePose joint in the frame of its segment [m]."""
     capsule_names: tuple[str, ...]
     """Names of the capsules."""
     capsule_segment: Ints
-    """Segment (K,) that carries each capsule."""
+    """Index (K,) of the segment to which each capsule is fixed."""
     capsule_ends: Points3
     """End points (..., K, 2, 3) of each capsule in the frame of its segment [m]."""
     capsule_radius_m: Floats
@@ -57,22 +57,22 @@ class Body:
 
 
 MEASURED = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
-"""Fields that differ from body to body."""
+"""Fields of `Body` with values that depend on the worker."""
 
 
 def assets_dir() -> Path:
-    """Return the assets folder; in a checkout it is a link to `assets/` beside the package."""
+    """Return the path of the assets folder, in a checkout a link to the folder `assets/`."""
     return Path(__file__).parents[1] / "assets"
 
 
 def worker_names() -> tuple[str, ...]:
-    """Return the names of the baked workers."""
+    """Return the names of the worker models in the assets."""
     return tuple(sorted(path.stem for path in (assets_dir() / "workers").glob("*.npz")))
 
 
 @functools.cache
 def load_body(name: str = "worker_1") -> Body:
-    """Read the measurements of a baked worker; raise `ConfigError` if the name is unknown."""
+    """Read the measurements of a worker model; raise `ConfigError` if the name is unknown."""
     with np.load(find_baked(name)) as baked:
         return Body(
             names=(name,),
@@ -85,7 +85,7 @@ def load_body(name: str = "worker_1") -> Body:
 
 @functools.cache
 def load_bodies(names: tuple[str, ...]) -> Body:
-    """Read the measurements of several baked workers."""
+    """Read the measurements of several worker models, stacked along a leading axis."""
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
@@ -96,11 +96,11 @@ def load_bodies(names: tuple[str, ...]) -> Body:
 
 
 ANY = "any"
-"""Name that selects all baked workers."""
+"""Name that selects all worker models."""
 
 
 def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of the bodies that workers can have; `ANY` selects all of them."""
+    """Return the names of the worker models in a selection; `ANY` selects all of them."""
     if worker == ANY:
         return worker_names()
     names = (worker,) if isinstance(worker, str) else tuple(worker)
@@ -121,7 +121,8 @@ def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
 
     Args:
         body: measurements of one body or of several bodies.
-        motion: segments (..., S, 3 or 4); with several bodies, `motion.body` holds their rows.
+        motion: poses and velocities (..., S, 3 or 4) of the segments; with several bodies,
+            `motion.body` contains the row of each worker's body.
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
@@ -156,7 +157,7 @@ def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> 
 
 
 def _find_rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
-    """Return the row (count,) in the pool of bodies for every moving body."""
+    """Return the row (count,) of each moving body in the pool of bodies."""
     rows, last = np.zeros(lead, np.int64), len(body.names) - 1
     if which is not None and last > 0:
         if which.size and not 0 <= which.min() <= which.max() <= last:
@@ -174,7 +175,7 @@ def _place_capsules(
         body: measurements of one body or of several bodies.
         position: origins (..., S, 3) of the segments [m].
         quaternion: orientations (..., S, 4) of the segments.
-        rows: row (count,) in the pool of bodies for every moving body.
+        rows: row (count,) of each moving body in the pool of bodies.
     """
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
     shape = (len(body.capsule_segment), 2, 3)
@@ -217,14 +218,14 @@ class _Joints(NamedTuple):
 def _write_joints(
     segments: _Segments, rows: Ints, joint_segment: Ints, joint_offset: Floats, joints: _Joints
 ) -> None:  # pragma: no cover - compiled
-    """Compute the positions of joints and their velocities v + omega x r on their segments.
+    """Compute the positions of joints, and their velocities v + omega x r.
 
     Args:
         segments: segments of N bodies.
         rows: row (N,) of each body in the pool.
         joint_segment: segment (J,) of each joint.
         joint_offset: positions (P, J, 3) of the joints of each body in their segments' frames [m].
-        joints: positions and velocities, which are written.
+        joints: positions and velocities of the joints, which are written.
     """
     for b in range(segments.position.shape[0]):
         offsets = joint_offset[rows[b]]
@@ -270,14 +271,14 @@ def _write_capsules(
 
 
 def find_baked(name: str) -> Path:
-    """Return the path of a baked worker's file; raise `ConfigError` if the name is unknown."""
+    """Return the path of a worker model's file; raise `ConfigError` if the name is unknown."""
     if name not in worker_names():
         raise make_unknown_name_error("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 
 def freeze(array: np.ndarray, dtype: type) -> np.ndarray:
-    """Return a read-only copy of an array; bodies are shared between callers."""
+    """Return a read-only copy of an array, which can be shared between callers."""
     copy = np.array(array, dtype=dtype)
     copy.setflags(write=False)
     return copy

@@ -21,9 +21,9 @@ class SkinMesh:
     faces: Ints
     """Triangles (F, 3), counter-clockwise seen from outside."""
     uv: Floats
-    """Texture coordinates (V, 2) in [0, 1], v = 0 at the texture's first row."""
+    """Texture coordinates (V, 2) in [0, 1], with v = 0 at the first row of the texture."""
     weights: Floats
-    """Skinning weights (V, S) of the segments; at most four per vertex, and rows sum to 1."""
+    """Skinning weights (V, S) of the segments, at most four per vertex; rows sum to 1."""
     texture: NDArray[np.uint8]
     """RGB texture (H, W, 3)."""
 
@@ -47,12 +47,12 @@ class WorkerMesh:
     skins: tuple[SkinMesh, ...]
     """Textured surfaces."""
     hat: HatMesh | None
-    """Hard hat; None for a worker without one."""
+    """Hard hat; None for a worker without hat."""
 
 
 @functools.cache
 def load_mesh(name: str = "worker_1") -> WorkerMesh:
-    """Read the surfaces of a baked worker; raise `ConfigError` if the name is unknown."""
+    """Read the surfaces of a worker model; raise `ConfigError` if the name is unknown."""
     with np.load(find_baked(name)) as baked:
         return WorkerMesh(
             tuple(_read_skin(baked, skin) for skin in ("skin", "cloth")), _read_hat(baked)
@@ -60,7 +60,7 @@ def load_mesh(name: str = "worker_1") -> WorkerMesh:
 
 
 def _read_skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinMesh:
-    """Return a textured surface of a baked worker."""
+    """Return a textured surface from the file of a worker model."""
     segment, share = baked[f"{name}_weight_segment"], baked[f"{name}_weight"].astype(float)
     weights = np.zeros((len(segment), N_SEGMENTS))
     np.add.at(weights, (np.arange(len(segment))[:, None], segment), share)
@@ -75,7 +75,7 @@ def _read_skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinMesh:
 
 
 def _read_hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
-    """Return the hard hat of a baked worker, if there is one."""
+    """Return the hard hat from the file of a worker model, or None if there is none."""
     if "hat_vertices" not in baked:
         return None
     red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
@@ -87,7 +87,7 @@ def _read_hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
 
 
 def _read_texture(baked: np.lib.npyio.NpzFile, name: str) -> NDArray[np.uint8]:
-    """Return the texture: palette colours darkened by a coarse shading map (creases, folds)."""
+    """Return a texture, with palette colours darkened by a coarse shading map of creases."""
     colours = baked[f"{name}_palette"][baked[f"{name}_paint"]].astype(np.float32)
     shade = _enlarge(baked[f"{name}_shade"].astype(np.float32) / 200.0, colours.shape[:2])
     return freeze(np.clip(colours * shade[..., None], 0.0, 255.0), np.uint8)

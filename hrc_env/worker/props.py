@@ -1,7 +1,8 @@
-"""Props that workers hold: shapes and grips of tools, boards, boxes and carts.
+"""Shapes and grips of the props held by workers: tools, boards, boxes and carts.
 
-While a prop is held upright in front of the body, the axes of its frame are the worker's (x
-forward, y left, z up). Its origin is in the fist, midway between two hands, or on the floor below.
+While a prop is held upright in front of the body, the axes of its frame coincide with the worker's
+(x forward, y left, z up). The origin of the frame is in the fist, midway between two hands, or on
+the floor below.
 """
 
 from collections.abc import Sequence
@@ -30,12 +31,12 @@ Xyz = Sequence[float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prop:
-    """An object that can be held, described in its own frame."""
+    """An object that can be held, described in a frame fixed to it."""
 
     name: str
     """Name of the prop."""
     shapes: Floats
-    """Solid parts (G, `shapes.WIDTH`): capsules and boxes [m]."""
+    """Capsules and boxes (G, `shapes.WIDTH`) of the solid parts [m]."""
     grips: Points3
     """Grip points (2, 3) of the left and the right hand [m]; NaN for a hand that is not used."""
 
@@ -150,16 +151,16 @@ PROPS: tuple[Prop, ...] = (
     # A piece of a stud, flat, held at its ends.
     _make_prop("stud", [_make_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
 )
-"""All props; the first one stands for empty hands."""
+"""All props; the first one represents empty hands."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
 """Names of the props."""
 BOUNDS_M = np.zeros((len(PROPS), 2, 3))
-"""Minimum and maximum corner (P, 2, 3) of each prop's bounding box, in the prop's frame [m]."""
+"""Minimum and maximum corners (P, 2, 3) of each prop's bounding box, in the prop's frame [m]."""
 for _row, _each in zip(BOUNDS_M[1:], PROPS[1:], strict=True):
     _row[:] = bounds(_each.shapes)
 _N_PARTS = max(len(prop.shapes) for prop in PROPS)
 _PARTS = np.tile(absent_shape(), (len(PROPS), _N_PARTS, 1))
-"""Parts (P, n, `shapes.WIDTH`) of every prop; unused rows are absent shapes."""
+"""Solid parts (P, n, `shapes.WIDTH`) of each prop; unused rows are absent shapes."""
 for _parts, _each in zip(_PARTS, PROPS, strict=True):
     _parts[: len(_each.shapes)] = _each.shapes
 
@@ -167,7 +168,7 @@ for _parts, _each in zip(_PARTS, PROPS, strict=True):
 def held_shapes(held: Held) -> Floats:
     """Return the solid parts (B, W n, `shapes.WIDTH`) of props that are held or at rest [m].
 
-    Each prop has n rows, the largest number of parts of any prop; unused rows are absent shapes.
+    Each prop has n rows, where n is the maximum number of parts; unused rows are absent shapes.
     """
     return place_shapes(held.kind, held.position_world, held.quaternion_wxyz, _PARTS)
 
@@ -199,7 +200,7 @@ def _place_parts(
         kind: kind (B, W) of each prop.
         position: position (B, W, 3) of each prop in the world [m].
         quaternion: orientation (B, W, 4) of each prop.
-        parts: parts (P, n, `shapes.WIDTH`) of every kind in its own frame.
+        parts: parts (P, n, `shapes.WIDTH`) of each kind, in the frame of the prop.
         rows: parts (B, W n, `shapes.WIDTH`), which are written.
     """
     n_parts = parts.shape[1]

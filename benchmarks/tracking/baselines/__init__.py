@@ -1,1 +1,1 @@
-"""Other libraries on the sequences of the tracking benchmark."""
+"""Evaluation of other libraries on the sequences of the tracking benchmark."""

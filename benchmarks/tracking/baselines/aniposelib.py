@@ -1,6 +1,7 @@
 """The optimizer of aniposelib for a whole clip (P. Karashchuk et al., Cell Reports 2021, BSD-2).
 
-It is offline: the joints of each frame are computed from all frames of the clip.
+The optimizer is an offline method: the joints in each frame are computed from all frames of the
+clip.
 """
 
 import contextlib
@@ -17,17 +18,17 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Estimate joints (T, J, 3) from pixels (T, C, J, 2); the seed is not used."""
+    """Estimate joints (T, J, 3) from pixels (T, C, J, 2); the seed is unused."""
     del seed
     points = np.ascontiguousarray(np.moveaxis(px, 1, 0))
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of compilers, and of joints that no camera sees
+        warnings.simplefilter("ignore")  # warnings of compilers, and of joints without detections
         group = _group(P)
         return np.asarray(group.triangulate_optim(points, constraints=BONES.tolist()), float)
 
 
 def _group(P: Floats) -> Any:
-    """Convert a rig, given by projections (C, 3, 4), to an object of the library."""
+    """Convert a rig, given by projections (C, 3, 4), to the library's camera group."""
     library = import_module("aniposelib.cameras")
     cameras = []
     for c, projection in enumerate(P):

@@ -1,10 +1,10 @@
 """The tracking benchmark with other libraries, on the same sequences.
 
-The two filters follow the documentation of their libraries: constant velocity, pixels as
-measurements, and protection against outliers (a likelihood with heavy tails in particles; a gate in
-filterpy, which restarts a joint that it has excluded). All libraries receive the pixels in every
-camera and frame, and the true standard deviation of the detector. None can distinguish left from
-right.
+The two filters follow the documentation of their libraries: a constant-velocity model, pixels as
+measurements, and protection against outliers (a likelihood with heavy tails for particles, and for
+filterpy a gate that restarts a joint after repeated rejections). All libraries receive the pixels
+of all cameras and frames, and the true standard deviation of the detector. None of them handles
+swapped left and right sides.
 """
 
 import time
@@ -37,19 +37,21 @@ CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")
 OURS = (DEFAULT, DLT)
 N_QUICK = 1
-"""Number of sequences per rig and condition in the quick form."""
+"""Number of sequences per rig and condition in a quick run."""
 Played = Mapping[tuple[str, str], list[dict[str, float]]]
-"""Results of each sequence, by rig and window and by name of the library."""
+"""Results of each sequence, by (rig and window, name of the library)."""
 
 
 @dataclass(frozen=True, slots=True)
 class BaselinesBench:
-    """The experiment, and its amount of data."""
+    """Benchmark of other libraries on simulated sequences."""
 
     name = "bench baselines"
     depends = ("tracker",)
     n_seeds: int = 5
-    """Number of sequences per rig and condition; these libraries take about a minute for each."""
+    """Number of sequences per rig and condition; the libraries take about a minute for each
+    sequence.
+    """
     first_seed: int = 1000
     """Seed of the first sequence; it increases by one with each further sequence."""
 
@@ -59,7 +61,7 @@ class BaselinesBench:
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds, one per sequence."""
+        """Seeds of the sequences."""
         return [self.first_seed + k for k in range(self.n_seeds)]
 
     @property
@@ -69,16 +71,16 @@ class BaselinesBench:
 
     @property
     def quick_note(self) -> str:
-        """Warning on the tables of a short run, or "" if it is long enough."""
+        """Warning for the tables of a short run, or "" if the run is long enough."""
         return describe_quick_run(self.n_seeds, find_durations()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings on which all numbers depend."""
+        """Return the settings on which all results depend."""
         versions = {name: version(name) for name in LIBRARIES if is_installed(name)}
         return {"baselines": asdict(self), "versions": versions, "missing": list_missing()}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the results of all libraries on every sequence."""
+        """Return the results of all libraries on all sequences."""
         cells: dict[tuple[str, str], list[dict[str, float]]] = {}
         for rig, condition in product(map(make_rig, RIGS), CONDITIONS):
             for seed, name in product(self.seeds, names()):
@@ -89,11 +91,11 @@ class BaselinesBench:
         return cells
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return all metrics by name."""
+        """Return all metrics of the results, by name."""
         return compute_metrics(played)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return the report."""
+        """Return the report, with its tables and figures."""
         return report(metrics)
 
 
@@ -117,10 +119,10 @@ def names() -> list[str]:
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """Compute the mean squared error and the time per update of each window of a sequence."""
+    """Compute the mean squared error and the time per update in each window of a sequence."""
     sequences = make_sequences(rig, condition, [seed])
     if name in LIBRARIES:
-        find_follow(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
+        find_follow(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compilation
     started_s = time.perf_counter()
     joints = _joints(name, rig, sequences, seed)
     took_us = 1e6 * (time.perf_counter() - started_s) / len(joints)
@@ -134,14 +136,14 @@ def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) ->
 
 
 def _joints(name: str, rig: Rig, sequences: Sequences, seed: int) -> Points3:
-    """Estimate the joints (T, J, 3) in a sequence with one person."""
+    """Estimate the joints (T, J, 3) in a sequence with one person [m]."""
     if name in LIBRARIES:
         return find_follow(name)(rig.P, sequences.px[:, 0, :, 0], seed)
     return np.stack([mean[0, 0] for mean, _ in beliefs(name, rig, sequences, [seed])])
 
 
 def compute_metrics(played: Played) -> dict[str, Metric]:
-    """Compute the RMSE over all sequences with the best and the worst, and times per update."""
+    """Compute RMSE and times per update, with the best and the worst sequence as interval."""
     metrics: dict[str, Metric] = {}
     times: dict[str, list[float]] = {}
     for (row, name), parts in played.items():
@@ -154,7 +156,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the report with errors, times, and missing libraries."""
+    """Return the report, with errors, times, and missing libraries."""
     lines = [
         [row, *(format_number(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
@@ -170,12 +172,12 @@ def report(metrics: Metrics) -> Report:
 
 
 def list_missing() -> list[str]:
-    """Return the names of libraries that are not installed."""
+    """Return the names of the libraries that are not installed."""
     return [name for name in LIBRARIES if not is_installed(name)]
 
 
 def describe_missing() -> str:
-    """Return a sentence on the missing libraries and their installation."""
+    """Return a sentence that lists the missing libraries and explains their installation."""
     if not list_missing():
         return "All libraries are installed."
     return (

@@ -13,11 +13,11 @@ from hrc_env.core.typing import Bools, Floats, Points2, Points3
 GATE_SIGMA = 5.0
 """Number of standard deviations from the prediction beyond which pixels are ignored."""
 PATIENCE = 3
-"""Number of consecutive frames that the gate rejects, after which a joint is restarted."""
+"""Number of consecutive frames rejected by the gate after which a joint is restarted."""
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Estimate joints (T, J, 3) from pixels (T, C, J, 2); the seed is not used."""
+    """Estimate joints (T, J, 3) from pixels (T, C, J, 2); the seed is unused."""
     del seed
     start = first_joints(P, px)
     joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
@@ -25,7 +25,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """Estimate positions (T, 3) of a joint from pixels (T, C, 2)."""
+    """Estimate the positions (T, 3) of a joint from pixels (T, C, 2)."""
     ukf, held, lost = _filter(start), start, 0
     track = []
     for frame in px:
@@ -36,7 +36,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
             if near.any():
                 R = SIGMA_PX**2 * np.eye(2 * int(near.sum()))
                 ukf.update(frame[near].ravel(), R=R, P=P[near])
-        except np.linalg.LinAlgError:  # the covariance is not positive definite: restart here
+        except np.linalg.LinAlgError:  # the covariance is not positive definite: restart
             ukf, near = _filter(held), seen
         lost = lost + 1 if seen.sum() >= 2 and near.sum() < 2 else 0
         if lost == PATIENCE:
@@ -50,7 +50,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
 
 
 def _gate(ukf: Any, P: Floats, frame: Points2) -> Bools:
-    """Return a mask (C,) of cameras with a pixel near the predicted one."""
+    """Return a mask (C,) of cameras in which the pixel is close to the predicted one."""
     kalman = import_module("filterpy.kalman")
     near = np.zeros(len(P), bool)
     for c in range(len(P)):

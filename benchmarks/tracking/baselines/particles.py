@@ -13,9 +13,10 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 N_PARTICLES = 1000
 FREEDOM = 3.0
-"""Degrees of freedom of the pixels' Student t distribution, with heavy tails for gross errors.
+"""Degrees of freedom of the Student t distribution of pixels, which has heavy tails.
 
-With a flat density of outliers, particles that are all outliers would drift away.
+Heavy tails represent gross errors. With a constant outlier density instead, particles for which all
+pixels are outliers would drift away.
 """
 
 
@@ -29,7 +30,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
 
 @contextmanager
 def _seed(seed: int) -> Iterator[None]:
-    """Seed NumPy's global generator, which the library uses, and restore it afterwards."""
+    """Seed NumPy's global generator, which the library uses, and restore its state afterwards."""
     before = np.random.get_state()  # noqa: NPY002
     np.random.seed(seed)  # noqa: NPY002
     try:
@@ -39,7 +40,7 @@ def _seed(seed: int) -> Iterator[None]:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """Estimate positions (T, 3) of a joint from pixels (T, C, 2)."""
+    """Estimate the positions (T, 3) of a joint from pixels (T, C, 2)."""
     particles = import_module("particles")
     moments = import_module("particles.collectors").Moments()
     model = import_module("particles.state_space_models").Bootstrap(
@@ -56,7 +57,7 @@ def _joint_model(P: Floats, start: Points3) -> Any:
     models = import_module("particles.state_space_models")
 
     class Pixels(distributions.ProbDist):
-        """Student t distribution of the pixels in the cameras that see the joint."""
+        """Student t distribution of the pixels in the cameras that detect the joint."""
 
         dim = 2 * len(P)
 
@@ -70,7 +71,7 @@ def _joint_model(P: Floats, start: Points3) -> Any:
             return np.where(np.isfinite(density), density, 0.0).sum(-1)
 
     class Joint(models.StateSpaceModel):
-        """A joint that moves with constant velocity."""
+        """State-space model of a joint that moves with constant velocity."""
 
         def PX0(self) -> Any:  # noqa: N802
             return distributions.MvNormal(loc=np.concatenate([start, np.zeros(3)]), cov=START_COV)

@@ -20,7 +20,7 @@ import numba
 from numba.core import config
 
 LEAN_WITH = ("0.68",)
-"""Releases of numba with which `lean`, which depends on the compiler's internals, was tested."""
+"""Releases of numba for which `lean` was tested; it depends on internals of the compiler."""
 UNTESTED = "hrc_env's compiler of kernels was not tested with numba"
 """Beginning of the warning about an untested release."""
 KERNELS: dict[str, Any] = {}
@@ -48,9 +48,10 @@ def kernel(
         function: the function, with type annotations; if omitted, a decorator with these options is
             returned.
         makes_arrays: whether it creates or returns arrays; without this option the compiler rejects
-            a function that does. In all other kernels, arrays are not reference-counted, for which
-            numba needs two atomic instructions per row, a fifth of the tracker's time; these
-            kernels must not call a kernel that returns an array, whose memory would never be freed.
+            a function that does. In kernels without this option, arrays are not reference-counted.
+            Counting takes two atomic instructions per row, a fifth of the tracker's time. These
+            kernels must not call a kernel that returns an array, because its memory would never be
+            freed.
         fastmath: permitted rearrangements of floating-point arithmetic (LLVM's flags).
         forceinline: whether it is inlined into its callers.
 

@@ -19,9 +19,9 @@ from hrc_env.core.machine import n_cores
 
 log = logging.getLogger("hrc_env.core.kernels")
 Say = Callable[[float, str], None]
-"""A function of (added share, current activity) that shows progress."""
+"""Callback that receives the increase of the completed fraction and the current activity."""
 AT_ONCE_S = 3.0
-"""Compile time below which a kernel is compiled on its first call [s]; starting a process takes
+"""Compile time below which a kernel is compiled on its first call [s]; the start of a process takes
 about as long."""
 LOG_EVERY_S = 10.0
 
@@ -61,7 +61,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
 
     Other child processes take kernels from the same iterator.
     """
-    quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
+    quiet = f"ignore:{UNTESTED}"  # the parent process warns once
     command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:
@@ -86,7 +86,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
 
 
 def _logged() -> Say:
-    """Return a function that writes progress to the log."""
+    """Return a callback that writes the progress to the log."""
     began_s = said_s = time.monotonic()
     done = 0.0
     log.warning(

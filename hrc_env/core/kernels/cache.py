@@ -72,7 +72,7 @@ class KernelCache(NullCache):
         name = f"{function.__module__.removeprefix('hrc_env.')}.{function.__qualname__}"
         file = f"{name}-{kind}-{made_of}{SUFFIX}"
         if not os.environ.get("NUMBA_CACHE_DIR") and (_beside() / file).exists():
-            return _beside() / file  # also where that can only be read
+            return _beside() / file  # even if that folder is read-only
         return folder() / file
 
     def load_overload(  # type: ignore[override]

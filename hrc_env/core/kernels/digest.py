@@ -25,7 +25,7 @@ def digest_of(dispatcher: Dispatcher) -> str:
     """Return the digest of a kernel, with the values of globals at the time of the first call."""
     known: dict[str, Any] = vars(dispatcher)
     if "_digest" not in known:
-        known["_digest"] = "itself"  # where a kernel calls itself
+        known["_digest"] = "itself"  # for a kernel that calls itself
         options = sorted(dispatcher.targetoptions.items())
         function = dispatcher.py_func
         parts = [function.__module__, _value(options, set()), *_function(function)]

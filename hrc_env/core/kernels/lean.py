@@ -1,4 +1,4 @@
-"""A faster way through numba's compiler: callees are only lowered, callers are compiled.
+"""A faster path through numba's compiler: callees are only lowered, callers are compiled.
 
 numba links, optimises and emits the code of every callee again at every level of calls. Here a
 callee is left in LLVM's intermediate form; the kernel that Python calls links every callee once,
@@ -27,7 +27,7 @@ from hrc_env.core.kernels.cache import KernelCache
 class LeanLibrary(codegen.JITCodeLibrary):
     """Code of one function.
 
-    The code of a kernel is compiled; that of a callee is kept for its callers.
+    The code of a kernel is compiled. The code of a callee is kept for its callers.
     """
 
     _is_callee = False
@@ -87,7 +87,7 @@ class LeanLibrary(codegen.JITCodeLibrary):
 
 
 class LeanContext(cpu.CPUContext):
-    """CPU context of numba with another way to compile libraries."""
+    """CPU context of numba that compiles libraries as described above."""
 
     def get_executable(self, library: LeanLibrary, fndesc: Any, env: Any) -> Any:
         """Return the function that Python calls; for a callee, a placeholder."""

@@ -1,7 +1,7 @@
-"""The usual way through numba's compiler, for releases with which `lean` was not tested.
+"""The standard path through numba's compiler, for releases for which `lean` was not tested.
 
-Callees are compiled at every level of calls: kernels take about twice as long to compile and run
-equally fast.
+Callees are compiled at every level of calls. Kernels take about twice as long to compile as with
+`lean`, and run equally fast.
 """
 
 from collections.abc import Callable

@@ -25,7 +25,7 @@ PATH = Path(__file__).with_name("signatures.json")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A kernel with the types of the arguments that it is called with."""
+    """A kernel with the types of its arguments in a recorded call."""
 
     kernel: str
     """Name of the kernel, as "module:name"."""
@@ -76,7 +76,7 @@ def encode(kind: Any) -> Any:
     named tuple.
 
     Raises:
-        TypeError: a type that no kernel has had so far.
+        TypeError: the type has no JSON form; no kernel has used it so far.
     """
     text: Any = str(kind)
     inside = [encode(each) for each in getattr(kind, "types", ())]
@@ -114,7 +114,7 @@ def decode(text: Any) -> Any:
 
 
 def _name_of(record: types.Record) -> str:
-    """Return the name "module:DTYPE" of the module's constant that holds a record's dtype."""
+    """Return "module:DTYPE", the name of the constant in a module that holds a record's dtype."""
     dtype = as_dtype(record)
     for module in [name for name in sys.modules if name.startswith("hrc_env.")]:
         for name, value in vars(sys.modules[module]).items():

@@ -11,7 +11,7 @@ from hrc_env.tracking.config import TrackerConfig
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """The settings that all episodes of a row share: scene, workers, estimator and cameras."""
+    """The settings of all episodes in a row of results: scene, workers, estimator and cameras."""
 
     name: str
     """Name of the setting in results.json."""
@@ -30,10 +30,10 @@ class Setting:
     motion: str = "model"
     """Treatment of velocities, one of `handicaps.MOTION`."""
     turns: tuple[Turn, ...] = (Turn(),)
-    """Choices of cameras over which episodes rotate, so that no result depends on the position of
-    one camera."""
+    """Choices of cameras. Successive episodes use them in turn, so that results do not depend on
+    the position of one camera."""
     by_sight: bool = False
-    """Whether errors are also grouped by the number of cameras that see the joint."""
+    """Whether errors are also reported by the number of cameras that see the joint."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if the setting cannot be played."""
@@ -49,21 +49,21 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """An ablation, which answers one question."""
+    """An ablation: settings that are compared to answer one question."""
 
     name: str
     """Name of the ablation in results.json and on the command line."""
     title: str
     """Title of the ablation in the report."""
     question: str
-    """Question, and description of the episodes that answer it."""
+    """The question, with a description of the episodes that answer it."""
     settings: tuple[Setting, ...]
-    """Settings, one per row."""
+    """Settings to compare, one per row."""
     also: Mapping[str, str] = field(default_factory=dict)
     """Groups of joints that are also evaluated, with their descriptions."""
     against: tuple[str, ...] = ()
-    """Names of reference settings. Every other setting is compared with the last reference before
-    it in the same scene."""
+    """Names of reference settings. Every other setting is compared with the last reference that
+    precedes it and has the same scene."""
 
     def find_setting(self, name: str) -> Setting:
         """Return a setting by name, or raise `ConfigError` if it does not exist."""
@@ -72,7 +72,7 @@ class Ablation:
         return known[name]
 
     def find_reference(self, setting: Setting) -> str:
-        """Return the name of the reference of a setting, or "" if there is none."""
+        """Return the name of the reference for a setting, or "" if there is none."""
         alike = [each for each in self.settings if each.scene == setting.scene]
         known = [k for k, each in enumerate(alike) if each.name in self.against]
         before = [k for k in known if k <= alike.index(setting)]

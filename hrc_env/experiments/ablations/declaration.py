@@ -1,4 +1,4 @@
-"""The declaration of the ablations: questions, columns and the table of the documentation."""
+"""The ablations in the order of the report, and the columns of their tables."""
 
 from hrc_env.experiments.ablations.ablation import Ablation
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
@@ -44,7 +44,7 @@ OF_SEVERAL = (
     Column("id_switches.{}", "switches [1/min]", 2),
     Column("idf1.{}", "IDF1 [%]", 1, 100),
 )
-"""Further columns for questions with several workers."""
+"""Further columns for ablations with several workers."""
 _SHOWN = {
     "cameras": "n1 n2 n3 n4 n8 corners walls low one_side two_neighbours two_opposite two_beside",
     "algorithm1": "n1_m100 n1_m10000 sigma_1cm n1_m1000",
@@ -56,7 +56,7 @@ _SHOWN = {
     "1cam_bones_of_any_length 1cam_no_floor 1cam_velocity_forgotten 1cam_mode_for_mean "
     "1cam_no_turned_body",
 }
-"""Settings in the table of the documentation, by question."""
+"""Names of the settings in the table of the documentation, by ablation."""
 
 
 def make_table(seconds: float) -> Table:
@@ -81,6 +81,6 @@ def make_table(seconds: float) -> Table:
 
 
 def list_columns(ablation: Ablation) -> tuple[Column, ...]:
-    """Return the columns of a question's table."""
+    """Return the columns of an ablation's table."""
     several = any(setting.n_workers > 1 for setting in ablation.settings)
     return (*COLUMNS, *MORE, *(OF_SEVERAL if several else ()))

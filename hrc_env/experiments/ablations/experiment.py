@@ -1,4 +1,4 @@
-"""The experiment that runs the ablations, setting by setting."""
+"""The experiment that runs all settings of the ablations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -32,12 +32,12 @@ from hrc_env.experiments.runner import check_at_least_one, is_as_short, override
 from hrc_env.experiments.versions import make_key
 
 Played = Mapping[str, Mapping[str, Sums]]
-"""Sums over episodes, by question and setting."""
+"""Sums over episodes, by ablation and setting."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ablations:
-    """The ablations and their settings."""
+    """The ablations to run, with the number and duration of their episodes."""
 
     name = "ablations"
     depends = ("env", "tracker", "emulator", "motion")
@@ -68,29 +68,29 @@ class Ablations:
 
     @property
     def ablations(self) -> tuple[Ablation, ...]:
-        """The questions, in the order of the report."""
+        """The ablations to run, in the order of the report."""
         return tuple(each for name, each in ABLATIONS.items() if name in self.studies)
 
     @property
     def n_parts(self) -> int:
-        """Number of settings of all questions."""
+        """Number of settings of all ablations."""
         return sum(len(ablation.settings) for ablation in self.ablations)
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" for other runs."""
+        """The warning on tables and figures of a quick run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return the settings on which all numbers depend.
 
-        The choice of questions is not among them, because it changes no number.
+        The choice of ablations is not included, because it does not affect the numbers.
         """
         return {name: value for name, value in asdict(self).items() if name != "studies"}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the sums of every setting; settings with the same walks are played in sequence."""
+        """Return the sums of every setting. Settings with the same walks are played in sequence."""
         order = sorted(
             (
                 (ablation.name, setting)
@@ -119,12 +119,12 @@ class Ablations:
         return (make_table(self.seconds),)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Draw a figure for each question and return the report."""
+        """Draw a figure for each ablation and return the report."""
         return make_report(figures, self.ablations, self.shown_tables(), metrics)
 
 
 QUICK = Ablations(n_seeds=4, seconds=5.0)
-"""The quick form, with few and short episodes."""
+"""The quick form of the experiment, with few and short episodes."""
 
 
 def make_experiment(
@@ -143,7 +143,7 @@ def play_setting(config: Ablations, setting: Setting, tick: PartProgress) -> Sum
 
 
 def compute_metrics(played: Played) -> dict[str, Metric]:
-    """Return all metrics by name, without those of empty groups of joints."""
+    """Return all metrics by name; groups that contain no joints have no metrics."""
     metrics: dict[str, Metric] = {}
     for name, of_settings in played.items():
         for setting, sums in of_settings.items():
@@ -168,7 +168,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
 
 
 def _measure_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
-    """Return the errors of joints and the coverage of their reported uncertainty."""
+    """Return the errors of joints, and how often the reported 95 % regions contain the truth."""
     return {
         f"error_m.{key}.median": estimate_quantile(ERRORS_M, sums["errors"], 0.5, "m"),
         f"error_m.{key}.p95": estimate_quantile(ERRORS_M, sums["errors"], 0.95, "m"),

@@ -1,4 +1,4 @@
-"""Changes to the state of a tracker that add or remove information before every image."""
+"""Changes to a tracker's state, before each update, that add or remove information."""
 
 from typing import Any
 
@@ -9,26 +9,27 @@ from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 BONES = ("learnt", "known", "none")
 """Treatments of bone lengths: "learnt" by the filter, "known" (set to the true lengths), or "none"
-(without a prior)."""
+(no prior)."""
 MOTION = ("model", "forgotten")
-"""Treatments of velocities: those of the filter's "model", or "forgotten" after every image.
+"""Treatments of velocities: "model" (estimated by the filter's motion model) or "forgotten" (reset
+after every image).
 
-Forgotten velocities have the standard deviation of a prior, as in line 7 of the paper's
-Algorithm 1.
+Forgotten velocities have the standard deviation of a prior, as in line 7 of the paper's Algorithm
+1.
 """
 TREES = ("particle", "kalman")
 """Estimators that support these treatments."""
 KNOWN_M2 = 1e-5
-"""Variance of a known length [m^2], the smallest that a filter may learn."""
+"""Variance of a known bone length [m^2], which is the lower limit of the variances in a filter."""
 UNKNOWN_M2 = 1e6
-"""Variance of a length without a prior [m^2]."""
+"""Variance of a bone length without a prior [m^2]."""
 SPEED_MPS = 1.0
-"""Standard deviation of a forgotten velocity along each axis [m/s] (judgement)."""
+"""Standard deviation of a forgotten velocity along each axis [m/s]. The value is an assumption."""
 _PARENT = np.where(np.arange(len(PARENT)) == ROOT, ROOT, PARENT)
 
 
 def compute_lengths_m(joints_world: Points3) -> Floats:
-    """Return the distance (B, W, J) from each joint to its parent in the tree [m].
+    """Return the distance (B, W, J) from each joint to its parent in the kinematic tree [m].
 
     It is 1 at the root.
     """
@@ -59,9 +60,9 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
 
 
 def _forget_velocities(trees: Any) -> None:
-    """Reset the velocities, and keep the marginal distribution of all positions.
+    """Reset the velocities without changing the marginal distribution of the positions.
 
-    The marginal distribution is again a Gaussian on the tree.
+    The marginal distribution is again a Gaussian on the kinematic tree.
     """
     cov, slope = trees["cov"], trees["slope"]
     of_parent = cov[..., _PARENT, :, :]

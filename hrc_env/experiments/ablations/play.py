@@ -1,7 +1,7 @@
-"""Episodes of a setting, in which an estimator tracks workers and is compared with the truth.
+"""Episodes of a setting, in which an estimator's tracks of workers are compared with the truth.
 
-The walks of the workers are computed once for all settings. Workers walk beside a resting arm, to
-which they do not react.
+The walks of the workers are computed once for all settings. Workers walk beside a stationary arm,
+to which they do not react.
 """
 
 from collections.abc import Iterator, Sequence
@@ -37,9 +37,9 @@ from hrc_env.worker.body import Body, load_bodies, select_bodies, worker_truth
 LEVEL = "keypoints"
 """Perception level of all settings."""
 BODIES = "any"
-"""Choice of bodies: in every episode, each worker has one of the baked bodies."""
+"""Choice of bodies: in every episode, each worker has one of the body models."""
 INSIDE_95 = float(chi2.ppf(0.95, 3))
-"""Squared Mahalanobis distance at the boundary of the 95 % region of a position."""
+"""Squared Mahalanobis distance at the boundary of the 95 % confidence region of a position."""
 Sums = dict[str, list[Any]]
 """Lists of sums by name, one value per episode."""
 
@@ -51,15 +51,14 @@ class Walks:
     bodies: Body
     """All bodies, stacked in one record."""
     motions: tuple[WorkerMotion, ...]
-    """Motions at T control steps, beginning with the start; each is a record of arrays (B, W,
-    ...)."""
+    """Motions at T control steps, including the start; each is a record of arrays (B, W, ...)."""
     q: JointAngles
-    """Joint angles (B, N) of the resting arm [rad]."""
+    """Joint angles (B, N) of the stationary arm [rad]."""
 
 
 @lru_cache(maxsize=1)
 def make_walks(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
-    """Simulate workers at their work and return one walk of `n_steps` control steps per seed."""
+    """Simulate working people; return one walk of `n_steps` control steps per seed as a batch."""
     config, bodies = HRCConfig(), load_bodies(select_bodies(BODIES))
     place = build(config.scene, scene, n_workers, bodies.names)
     state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
@@ -81,7 +80,7 @@ def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgres
         setting: the setting.
         walks: walks of the workers.
         seeds: seeds of detector and estimator; episode k uses turn k modulo the number of turns.
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     jobs, found = _split_jobs(setting.turns, len(seeds)), Sums()
 
@@ -102,13 +101,13 @@ class Job(NamedTuple):
     """Episodes that are played as one batch."""
 
     turn: Turn
-    """Cameras and their faults."""
+    """Cameras of the episodes, and their faults."""
     ids: Ints
     """Indices (B,) of the episodes."""
 
 
 def _split_jobs(turns: Sequence[Turn], n_episodes: int) -> list[Job]:
-    """Return the jobs of all turns; results do not depend on the number of jobs."""
+    """Return the batches of all turns. Results do not depend on the number of batches."""
     jobs = []
     for k, turn in enumerate(turns[:n_episodes]):
         ids = np.arange(k, n_episodes, len(turns))
@@ -150,7 +149,10 @@ def _play_episodes(
 
 
 def _sum_joints(error_m: Floats, inside: Bools, mask: Bools, prefix: str) -> Sums:
-    """Return sums of the values (B, T, W, J) in a mask, with names that begin with `prefix`."""
+    """Return sums over the elements (B, T, W, J) that a mask selects.
+
+    The names of the sums begin with `prefix`.
+    """
     axes = tuple(range(1, error_m.ndim))
     return {
         f"{prefix}errors": ERRORS_M.count(error_m, mask).tolist(),
@@ -161,14 +163,14 @@ def _sum_joints(error_m: Floats, inside: Bools, mask: Bools, prefix: str) -> Sum
 
 
 class WatchedFrame(NamedTuple):
-    """One frame of some episodes."""
+    """Estimate, truth and detections at one frame of some episodes."""
 
     estimate: PoseEstimate
     """Estimate of the tracker."""
     truth: TrueSensorInput
     """True state."""
     keypoints: Keypoints
-    """Detections of the cameras."""
+    """Keypoints that the cameras detect."""
 
 
 def watch(
@@ -216,9 +218,9 @@ def make_scene(setting: Setting, turn: Turn) -> Scene:
 
 
 def match_tracks(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """Return the index (B, W) of each worker's track, for the least sum of distances.
+    """Return the index (B, W) of the track of each worker, for the least sum of distances.
 
-    Inactive tracks have a cost of 0, so that they are assigned to the workers that remain.
+    Inactive tracks have a cost of 0; they are assigned to the workers that remain.
 
     Args:
         mean_world: estimated joints of the tracks (B, W, J, 3) [m].
@@ -234,7 +236,7 @@ def match_tracks(mean_world: Points3, tracked: Bools, joints_world: Points3) -> 
 
 
 def count_seeing_cameras(truth: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
-    """Return the number of working cameras (B, W, J) with a free line of sight to each joint."""
+    """Return the number (B, W, J) of working cameras with an unobstructed view of each joint."""
     surroundings = scene.surroundings(truth.qpos, truth.motion.held)
     sight, _ = lines_of_sight(truth.truth, surroundings, scene.cameras)
     gone = {name for fault in turn.faults if fault.kind == "lost" for name in fault.cameras}

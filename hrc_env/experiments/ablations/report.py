@@ -1,4 +1,4 @@
-"""The report of the ablations, with a text, a figure and a table for each question."""
+"""The report of the ablations, with a text, a figure and a table for each ablation."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,12 +22,12 @@ QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s
 def make_report(
     figures: Path, ablations: Sequence[Ablation], tables: Sequence[Table], metrics: Metrics
 ) -> Report:
-    """Draw a figure for each question and return the report.
+    """Draw a figure for each ablation and return the report.
 
     Args:
         figures: folder of the figures.
-        ablations: the questions.
-        tables: tables over all questions, which come first.
+        ablations: the ablations.
+        tables: tables over all ablations, which are shown first.
         metrics: metrics of the study by name.
     """
     is_whole = len(ablations) == len(ABLATIONS)
@@ -51,7 +51,7 @@ def make_report(
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
-    """Draw the errors of all rows with intervals, and write their coverage on the right."""
+    """Draw the errors of all rows with intervals, and print their coverage on the right."""
     places = np.arange(len(rows), dtype=float)[::-1]
     figure = make_figure(9, 0.3 * len(rows) + 1.6)
     axis = figure.subplots()

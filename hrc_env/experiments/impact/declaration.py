@@ -34,7 +34,7 @@ Late images carry their time stamps, from which the tracker predicts; images tha
 time-stamped appear to be current."""
 _STEPS = "[per 1,000 steps]"
 _ROW = "{0}.{1}."
-"""Prefix of metrics, made of the policy and the setup."""
+"""Prefix of the names of metrics, with placeholders for the policy and the setup."""
 COLUMNS = (
     Column(_ROW + "goals_per_min", "goals [1/min]"),
     Column(_ROW + "contacts_towards", "contacts towards [1/min]", 2, counted=True),
@@ -112,7 +112,7 @@ def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> 
     Args:
         policy: label of the policy.
         setups: names of perception setups, without the reference.
-        marked: whether differences are marked if their interval excludes zero.
+        marked: whether a difference is marked if its interval excludes zero.
     """
     columns = [
         replace(each, metric=f"difference.{each.metric}", signed=True, marked=marked)

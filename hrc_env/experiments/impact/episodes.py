@@ -1,7 +1,7 @@
 """Episodes of one policy with one perception setup, on fixed seeds and with the same workers.
 
-Distances are between true capsules, as in the cost; `safety.incidents` defines directed speeds and
-contacts.
+As for the cost, distances are measured between the true capsules. `safety.incidents` defines
+directed speeds and contacts.
 """
 
 import hashlib
@@ -41,9 +41,9 @@ STEP = np.dtype([
 ])  # fmt: skip
 """Data type of a step: true and estimated separation at its end, directed speeds, joint errors.
 
-The estimated separation is infinite without a track. The speeds of robot and worker are directed
-towards each other [m/s]. Errors of the estimated joints and positions of the true joints are in
-metres.
+The estimated separation is infinite if there is no track. Speeds of the robot towards the worker,
+and of the worker towards the robot, are positive [m/s]. Errors of the estimated joints and
+positions of the true joints are in metres.
 """
 Steps = NDArray[np.void]
 
@@ -64,7 +64,7 @@ def play(
         n_steps: number of control steps of an episode.
         make_agent: function that makes the policy, which receives only observations.
         margin_m: distance that the policy adds to its limits [m].
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
 
     def play_block(env: Shards, seeds: list[int], tick: PartProgress) -> Rows:
@@ -93,19 +93,19 @@ def play_row(
         n_steps: number of control steps of an episode.
         make_agent: function that makes the policy, which receives only observations.
         margin_m: distance that the policy adds to its limits [m].
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     with closing(Stage(setup, setup.turns, env_arguments)) as stage:
         return play(stage, seeds, n_steps, make_agent, margin_m, tick)
 
 
 class PlayedEpisodes(NamedTuple):
-    """The steps of episodes that were played as one batch."""
+    """Steps of episodes that were played as one batch."""
 
     steps: Steps
-    """Records of T steps (T, B), of type `STEP`."""
+    """Records (T, B) of the T steps, of type `STEP`."""
     infos: list[Info]
-    """Infos of T steps."""
+    """Infos of the T steps."""
 
 
 def run(
@@ -198,7 +198,7 @@ def _count_decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
 
 
 def _count_values(steps: Steps) -> dict[str, Ints]:
-    """Return histograms (B, bins) of joint errors, and of separation errors and speeds if near."""
+    """Return histograms (B, bins): joint errors; near the worker, separation errors and speeds."""
     near = (steps["true_separation_m"] < SLOW_M).T
     optimism_m = (steps["believed_separation_m"] - steps["true_separation_m"]).T
     return {

@@ -1,4 +1,4 @@
-"""The impact study, in which every policy meets the same workers with every perception setup."""
+"""The impact study, in which each policy meets the same workers with all perception setups."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -49,11 +49,11 @@ FIRST_SEED = 1_000_000
 
 
 class SetupRows(NamedTuple):
-    """The rows of one perception setup."""
+    """Rows of results with one perception setup."""
 
     setup: PerceptionSetup
     policies: list[Policy]
-    """Policies, each of which has one row."""
+    """Policies, one per row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,23 +67,23 @@ class Impact:
     shield: str | None = None
     """Name of the shield, or None for no shield."""
     n_seeds: int = 90
-    """Number of episodes per row; at the level `pixels`, at most `n_pixels`."""
+    """Number of episodes per row. At the level `pixels`, it is limited to `n_pixels`."""
     n_pixels: int = 3
     """Number of episodes per row at the level `pixels`, at which every image is rendered."""
     n_steps: int = 250
     """Number of control steps of an episode; the command uses the time limit of the task."""
     learning_steps: int = 300_000
-    """Number of environment steps in the training of PPO."""
+    """Number of environment steps for the training of PPO."""
     policies: tuple[str, ...] = POLICIES
     """Policies to compare: `POLICIES`, or agents as `hrc_env.make_agent` accepts them."""
     control: str | None = None
-    """Control mode of policies without one in their files; None: the default."""
+    """Control mode of the policies that have none in their files; None: the default."""
     trust: bool = False
     """Whether pickles in the policies' checkpoints may be loaded, as in `make_agent`."""
     setups: tuple[str, ...] = field(default_factory=list_default_setups)
     """Names of perception setups, which must include the reference."""
     margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
-    """Margins to compare [m], which `scripted_slowed` adds to its limits."""
+    """Margins to compare [m]. The agent `scripted_slowed` adds them to its limits."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""
@@ -116,7 +116,7 @@ class Impact:
 
     @property
     def is_quick(self) -> bool:
-        """Whether there are too few episodes or training steps for comparisons."""
+        """Whether the numbers of episodes or training steps are too small for comparisons."""
         is_short = PPO in self.policies and self.learning_steps <= QUICK["learning_steps"]
         return any(getattr(self, n) <= QUICK[n] for n in ("n_seeds", "n_steps")) or is_short
 
@@ -182,7 +182,7 @@ class Impact:
     def _make_parts(
         self, setup: PerceptionSetup, policy: Policy, checkpoint: Path, ppo: str
     ) -> list[Part]:
-        """Return the parts of a row, of at most `N_TOGETHER` episodes each."""
+        """Return the parts of a row; each has at most `N_TOGETHER` episodes."""
         control = choose_control(policy, self.control)
         env_arguments: dict[str, Any] = {"task": self.task, "shield": self.shield}
         env_arguments |= {} if control is None else {"control": control}
@@ -208,7 +208,7 @@ class Impact:
         ppo: str,
         seeds: Sequence[int],
     ) -> str:
-        """Return the key of a part of a row."""
+        """Return the cache key of a part of a row."""
         shared = {
             "people": PEOPLE,
             "task": self.task,
@@ -236,7 +236,7 @@ class Impact:
 
 
 def _play(label: str, *given: Any) -> Any:
-    """Return the sums of `play_row`, and add the policy's label to the messages of errors."""
+    """Return the sums of `play_row`, and prefix messages of errors with the policy's label."""
     try:
         return play_row(*given)
     except ConfigError as error:
@@ -259,8 +259,8 @@ def make_experiment(
 ) -> Impact:
     """Return the experiment for the options of the command line.
 
-    If estimators are given, only these, the reference, the truth and no perception are compared; if
-    robots are given, only these agents are compared.
+    If estimators are given, only these, the reference, true poses and no perception are compared.
+    If robots are given, only these agents are compared.
     """
     whole = Impact(n_steps=find_task(task).max_episode_steps)
     config = override(
@@ -273,7 +273,7 @@ def make_experiment(
 
 
 def check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:
-    """Raise `HRCError` if the worker of a seed did not move identically in every row."""
+    """Raise `HRCError` if the workers of a seed moved differently in any two rows."""
     longest = max((row["walk"] for row in table.values()), key=len)
     for (policy, setup), row in table.items():
         if row["walk"] != longest[: len(row["walk"])]:

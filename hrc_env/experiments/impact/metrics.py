@@ -1,12 +1,14 @@
 """Metrics of the impact study: rows, differences from the reference, and the cost of latency.
 
-The separation lost to latency is measured in two ways, both relative to the ground truth: in the
-belief, as the increase of the 95th percentile of the estimated minus the true separation; in the
-loop, as the margin that `scripted_slowed` must add to its limits to have the same share of missed
-stops as without latency. It is predicted as latency x (v_h + v_r), with a worker's nominal speed or
-with measured speeds. A third prediction assumes that latency and other errors are independent:
-their squares then add up, and the robot's speed has no effect, because its encoders have no
-latency.
+The loss of separation due to latency is measured in two ways, both relative to the ground truth:
+
+- in the belief, as the increase of the 95th percentile of the estimated minus the true separation;
+- in closed loop, as the margin that `scripted_slowed` must add to its limits to reach the fraction
+  of missed stops without latency.
+
+It is predicted as latency x (v_h + v_r), with either the nominal speed of a worker or measured
+speeds. A third prediction assumes that the effect of latency is independent of other errors: their
+squares add up, and the robot's speed has no effect, because the robot's encoders have no latency.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,17 +33,18 @@ Row = Mapping[str, list[Any]]
 Played = Mapping[tuple[str, str], Row]
 """Rows by policy and setup."""
 NOMINAL_MPS = 1.6
-"""Nominal speed of a worker's approach (ISO 13855, as in Marvel and Norcross 2017, PMC5117641;
-verify against the standard before certification) [m/s]."""
+"""Nominal speed of a worker's approach [m/s]. Source: ISO 13855, as in Marvel and Norcross 2017,
+PMC5117641; verify it against the standard before certification."""
 CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
 """Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
-"""Metrics per minute, with the names of the sums from which they are computed."""
+"""Metrics per minute, with the names of the sums that are divided by the duration."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
-"""Sums that are given per 1,000 control steps; `called_slowings` counts steps near the worker."""
+"""Sums that are reported per 1,000 control steps; `called_slowings` counts steps near the
+worker."""
 AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
 """Sums that are averaged over episodes, with their units."""
 
@@ -159,10 +162,11 @@ def _compute_ratios(row: Row) -> dict[str, Ratio]:
 
 
 def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
-    """Return the separation tax Z_d + latency x (v_h + v_r) [m].
+    """Return the separation Z_d + latency x (v_h + v_r) that perception requires [m].
 
-    Z_d is that of the same setup without latency, so that latency is not counted twice; v_h is the
-    worker's nominal speed, and v_r the robot's measured speed.
+    Z_d is the 95th percentile of the position errors in the same setup without latency, so that
+    latency is not counted twice; v_h is the worker's nominal speed, and v_r the robot's measured
+    speed.
     """
     value, low, high = (
         getattr(z_d, end) + latency_s * (NOMINAL_MPS + getattr(v_r, end))
@@ -174,7 +178,7 @@ def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
 def _measure_lateness(
     setup: PerceptionSetup, table: Played, metrics: Metrics, margins_m: Sequence[float]
 ) -> dict[str, Metric]:
-    """Return the separation lost to latency [m], predicted in three ways and measured in two."""
+    """Return the separation lost to latency [m], as predicted in three ways and measured in two."""
     key, reference = f"{SLOWED}.{setup.name}", f"{SLOWED}.{REFERENCE}"
     v_h, v_r = metrics[f"{key}.v_h_mps"].value, metrics[f"{key}.v_r_mps"].value
     before, after = metrics[f"{reference}.optimism_p95_m"], metrics[f"{key}.optimism_p95_m"]
@@ -196,7 +200,7 @@ def _measure_lateness(
 
 
 def find_margin(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
-    """Return the margin at which the share of missed stops falls to that of the reference [m].
+    """Return the margin at which the fraction of missed stops falls to that of the reference [m].
 
     Args:
         rows: rows of one setup, one per margin.

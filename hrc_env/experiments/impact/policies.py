@@ -1,4 +1,4 @@
-"""The policies of the impact study: two scripted ones, PPO, and agents of users."""
+"""The policies of the impact study: two scripted ones, PPO, and users' agents."""
 
 import hashlib
 from collections.abc import Callable
@@ -29,13 +29,13 @@ WORDS = {
 POLICIES = tuple(WORDS)
 """Names of the study's built-in policies."""
 SEED = 0
-"""Seed of the learner and of its environments."""
+"""Seed of the learner and of its training environments."""
 N_ENVS = 64
 """Number of training environments."""
 PROXIMITY = 2.0
-"""Weight of proximity in the reward, as in `train.py`."""
+"""Weight of the proximity term in the reward, as in `train.py`."""
 RAMP_SHARE = 0.5
-"""Share of the training steps in which the weight of proximity grows from 0."""
+"""Fraction of the training steps in which the weight of the proximity term grows from 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Policy:
 
     @property
     def label(self) -> str:
-        """Label of the policy in parts and results."""
+        """Label of the policy in the names of parts and results."""
         if self.name not in POLICIES:
             return label_agent(self.name, WORDS)
         if self.margin_m == 0:
@@ -58,7 +58,7 @@ class Policy:
 
 
 def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
-    """Return the settings of a policy for the keys of its rows, for JSON.
+    """Return the settings of a policy as JSON values, for the cache keys of its rows.
 
     Args:
         policy: the policy.
@@ -70,17 +70,14 @@ def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
 
 
 def choose_control(policy: Policy, control: str | None) -> str | None:
-    """Return the control mode of a policy: that of its file, or otherwise the requested one.
-
-    PPO is trained with the default control.
-    """
+    """Return the control mode of a policy: that of its file, or otherwise the requested one."""
     if policy.name == PPO:
         return None
     return control if policy.name in POLICIES else find_control(policy.name) or control
 
 
 def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
-    """Return a function that makes the agent for a simulation and can be sent to any machine."""
+    """Return a picklable function that makes the agent for a simulation."""
     if policy.name == SLOWED:
         return partial(_make_slowed, policy.margin_m)
     name = str(checkpoint) if policy.name == PPO else policy.name
@@ -97,11 +94,11 @@ def _make_agent(name: str, trust: bool, part: Simulation) -> Agent:
 
 
 def train_once(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
-    """Return the digest of PPO's checkpoint, and train PPO if the file does not match its part.
+    """Return the digest of PPO's checkpoint; train PPO first if the file does not match its part.
 
     Args:
         cache: cache of the study's parts.
-        n_steps: environment steps of the training.
+        n_steps: number of environment steps for the training.
         path: file of the checkpoint.
         key: key of the part.
         task: id of the environment.
@@ -133,11 +130,11 @@ def train(env: Any, n_steps: int, seed: int, on_step: Callable[[Any], None]) -> 
 
     Args:
         env: the environments, which are closed after the training.
-        n_steps: environment steps of the training.
+        n_steps: number of environment steps for the training.
         seed: seed of the learner.
         on_step: callback that receives the learner before the training and after each step.
     """
-    import torch  # here: a learner takes seconds to import, and need not be there
+    import torch  # here: it takes seconds to import and is optional
     from stable_baselines3.common.callbacks import ConvertCallback
 
     from hrc_env.agents import callbacks, ppo

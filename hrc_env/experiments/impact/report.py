@@ -21,14 +21,15 @@ from hrc_env.experiments.setups import LATE_S, REFERENCE, find_setup
 from hrc_env.tracking.estimators import ESTIMATORS
 
 LEAST_SHARE = 0.25
-"""Least share of the best policy's goals at which PPO counts as having learnt the task."""
+"""Fraction of the best policy's goals per minute from which PPO counts as having learnt the
+task."""
 COLOURS = {
     "particle": "C0", "kalman": "C2", "triangulation": "C4", "paper_restarts": "C6",
     "truth": "black", "none": "0.55", "pixels": "C1",
 }  # fmt: skip
 """Colours of perception levels, and of estimators with four cameras."""
 FREE_COLOURS = ("C3", "C5", "C8", "C9")
-"""Colours of other estimators, which are used in turn."""
+"""Colours of the remaining estimators, which are used in turn."""
 CAMERA_COLOURS = {4: "C0", 3: "#5aa2d6", 2: "#e8a33d", 1: "#d1495b"}
 """Colours by number of cameras."""
 LATE_MARKS = {0.0: "o", LATE_S[0]: "s", LATE_S[1]: "^"}
@@ -50,8 +51,8 @@ def make_report(
         table: rows of episodes.
         metrics: metrics by name.
         robots: agents by their labels in the table.
-        warning: text at the top of the report if the run is too short for comparisons, in which
-            case no difference is marked; "" for other runs.
+        warning: text at the top of the report if the run is too short for comparisons; no
+            difference is then marked. "" for other runs.
     """
     policies = [name for name in robots if (name, REFERENCE) in table]
     question = [*filter(None, (warning, QUESTION, _describe_robots(robots)))]
@@ -117,14 +118,14 @@ def draw_tradeoff(
 ) -> None:
     """Draw goals per minute against true cost while the robot moves towards the worker.
 
-    A second row of panels shows goals against approaches, without setups that have no track and
-    without the policy that ignores the worker.
+    A second row of panels shows goals against approaches. It omits setups without tracks and the
+    policy that ignores the worker.
 
     Args:
         path: picture file to write.
         metrics: metrics by name.
-        policies: labels of policies, one column each.
-        setups: names of setups, one point each.
+        policies: labels of the policies, with one column of panels each.
+        setups: names of the setups, with one point each.
     """
     looking = [name for name in policies if name != SCRIPTED]
     n_rows = 2 if looking else 1

@@ -19,12 +19,13 @@ is off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras
 the estimate is further from the truth than that. A side is *turned away* if its shoulder and hip
 are further from the camera than the other's by 8 cm."""
 ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
-"""Estimators that are replayed on the films; missed joints are counted for the first."""
+"""Estimators that are replayed on the films. Missed joints are counted for the first one."""
 SINGLE = tuple(camera for camera in CAMERA_LABELS if camera != MULTI)
 ALL = "all"
-"""Name of all motions together."""
+"""Name of the results over all motions."""
 SHOWN = "paper_restarts"
-"""Second estimator in the table of the documentation, with its errors over all motions."""
+"""Second estimator in the table of the documentation, which contains its errors over all
+motions."""
 WORDS = {
     **{motion: motion for motion in (*MOTIONS, ALL)},
     "moving_board": "moving a board in both hands",

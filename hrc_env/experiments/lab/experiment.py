@@ -1,4 +1,4 @@
-"""The laboratory study, which films motions with four cameras and compares one camera with all."""
+"""The laboratory study, which compares one camera with four cameras on films of six motions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -33,7 +33,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import load_body, worker_names
 
 RIG = "lab_gopro"
-"""Name of the rig of cameras."""
+"""Name of the camera rig."""
 CROPS = "particle"
 """Name of the estimator that the crops follow."""
 QUANTILES = {"median": 0.5, "p95": 0.95}
@@ -54,7 +54,7 @@ class Lab:
     n_seeds: int = 7
     """Number of films per motion."""
     max_frames: int = 250
-    """Greatest number of frames in a film."""
+    """Maximum number of frames in a film."""
     folded: str = "full"
     """Landmark network for folded postures; "heavy" must first be fetched with `python -m hrc_env
     setup --networks heavy`."""
@@ -71,12 +71,12 @@ class Lab:
 
     @property
     def n_parts(self) -> int:
-        """Number of films."""
+        """Number of films, which are the parts of the study."""
         return self.n_seeds * len(MOTIONS)
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" for other runs."""
+        """The warning on tables and figures of a quick run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
@@ -108,7 +108,7 @@ class Lab:
 
 
 QUICK = Lab(n_seeds=2, max_frames=100)
-"""The quick form, with fewer and shorter films."""
+"""The quick form of the study, with fewer and shorter films."""
 
 
 def make_experiment(quick: bool = False, seeds: int | None = None, folded: str = "full") -> Lab:
@@ -117,14 +117,14 @@ def make_experiment(quick: bool = False, seeds: int | None = None, folded: str =
 
 
 class Laboratory(NamedTuple):
-    """The room of the study, with the configuration of the environment."""
+    """The scene of the study, with the configuration of the environment."""
 
     scene: Scene
     config: HRCConfig
 
 
 def make_laboratory(seed: int, folded: str = "full") -> Laboratory:
-    """Return the room with the paper's four cameras; the seed chooses one of the baked bodies."""
+    """Return the scene with the paper's four cameras; the seed selects one of the body models."""
     names = worker_names()
     config = HRCConfig(
         worker=names[seed % len(names)],
@@ -183,7 +183,10 @@ def compute_metrics(played: Films) -> dict[str, Metric]:
 
 
 def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
-    """Return shares of joints that are missed, overall and on the averted side, and recovered."""
+    """Return the fractions of joints missed, missed on the averted side, and recovered.
+
+    A joint that one camera missed is recovered if all cameras together locate it.
+    """
     metrics = {}
     counted = np.array([_count_joints(film) for film in films]).T
     for column, (n, missed, away, far, back) in zip(SINGLE, counted, strict=True):
@@ -199,8 +202,8 @@ def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
 def _count_joints(film: Film) -> Floats:
     """Return counts of joints (5, C) for each camera.
 
-    The rows count all joints, the missed joints, the joints turned away, those of them that are
-    missed, and those of the latter that all cameras together locate.
+    The five rows count all joints, missed joints, joints on the averted side, missed joints on the
+    averted side, and those of the latter that all cameras together locate.
     """
     missed, away = (np.asarray(film[name], bool) for name in ("missed", "away"))
     far = missed & away
@@ -214,5 +217,5 @@ def _read_errors_m(film: Film, key: str) -> Floats:
 
 
 def _find_known(film: Film) -> Bools:
-    """Return a mask (T, J) of the joints that the estimate from all cameras has not missed."""
+    """Return a mask (T, J) of the joints that all cameras together locate."""
     return _read_errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]

@@ -1,4 +1,4 @@
-"""Motions of the laboratory study: those of the paper, composed of activities of this package."""
+"""Motions of the laboratory study: the paper's motions, composed of activities of this package."""
 
 import math
 
@@ -31,13 +31,13 @@ worker lifts a board with both hands, instead of the paper's whiteboard. In "mov
 MOTIONS = ("standing", WALKING, "bending", "lifting", "moving_board", "moving_wood")
 """Names of the motions."""
 START_Y_M, START_X_M = 1.5, (0.9, 1.6)
-"""Start of motions past the robot [m]: distance to the side, and range along the robot's axis."""
+"""Start of motions that lead past the robot [m]: distance to its side, and range along its axis."""
 
 
 def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
     """Return a motion (T, 1, S, ...) of at most `n_frames` frames at intervals of `dt_s`.
 
-    Position and heading are drawn at random with the seed.
+    Position and heading are sampled with the seed.
     """
     if motion == WALKING:
         return walk(scene, seed, n_frames, dt_s)

@@ -1,4 +1,4 @@
-"""The report of the laboratory study: the paper's figure 6 with data of the study, and errors."""
+"""The report of the laboratory study: errors, and the paper's figure 6 with the study's data."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -30,7 +30,7 @@ from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
 WARM_UP = 12
-"""Number of frames at the start for which all cameras are used, and which are not evaluated."""
+"""Number of frames at the start of a film in which all cameras are used. They are not evaluated."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
@@ -57,7 +57,8 @@ def make_report(figures: Path, take: Callable[[str], Recording], metrics: Metric
 def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:
     """Draw one row of pictures per motion.
 
-    A row shows a crop with its detections, and the body as estimated from one camera and from four.
+    Each row shows a crop with its detections, and the bodies estimated from one camera and from
+    four.
 
     Args:
         path: picture file to write.
@@ -82,9 +83,9 @@ class CameraFrame(NamedTuple):
     """One frame of one camera."""
 
     t: int
-    """Index of the frame."""
+    """Index of the frame in the recording."""
     camera: int
-    """Index of the camera."""
+    """Index of the camera in the rig."""
 
 
 def find_shown_frame(recording: Recording) -> CameraFrame:
@@ -102,7 +103,7 @@ def find_shown_frame(recording: Recording) -> CameraFrame:
 
 
 def _render_crop(recording: Recording, frame: CameraFrame) -> Image:
-    """Return the crop of a camera that the network received, enlarged and with its detections."""
+    """Return the crop that the network received from a camera, enlarged and with its detections."""
     t, c = frame
     scene, window = recording.scene, recording.windows[t][0][c]
     renderer = CropRenderer(scene, CROP_PX)
@@ -120,7 +121,7 @@ def _render_crop(recording: Recording, frame: CameraFrame) -> Image:
 def _draw_body(
     figure: Figure, place: int, recording: Recording, estimate: Points3, frame: CameraFrame
 ) -> None:
-    """Draw an estimate and the truth, viewed from a direction beside that of the camera."""
+    """Draw an estimate and the truth, seen from a viewpoint beside the camera."""
     axis: Any = figure.add_subplot(3, 3, place, projection="3d")
     (t, c), alone = frame, place % 3 == 2
     truth = recording.joints_world[t]

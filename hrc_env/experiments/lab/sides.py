@@ -1,4 +1,4 @@
-"""Joints that a camera missed, and joints on the side turned away from it."""
+"""Detection of joints that a camera missed, and of joints on the side turned away from it."""
 
 import numpy as np
 
@@ -9,14 +9,16 @@ from hrc_env.geometry.cameras import project, projections
 from hrc_env.worker.body import load_body
 
 MISSED_CONFIDENCE = 0.5
-"""Visibility below which a joint counts as missed (judgement); the network returns all joints."""
+"""Visibility below which a joint counts as missed. The network returns all joints, and the value is
+an assumption."""
 MISSED_SHARE = 0.05
-"""Error above which a joint counts as missed, as a share of the stature in the image or in 3D."""
+"""Error above which a joint counts as missed, as a fraction of the body height in the image or in
+3D."""
 TURNED_M = 0.08
-"""Difference of distances above which a side of the body counts as turned away [m].
+"""Difference in distance above which a side of the body counts as turned away from the camera [m].
 
-Distances from the camera are means over the shoulder and the hip of each side. The value is a
-judgement: a body is 0.36 m wide at the shoulders.
+The distance of a side is the mean over its shoulder and hip. The value is an assumption: bodies are
+0.36 m wide at the shoulders.
 """
 
 LEFT: Bools = np.array([name.startswith("left_") for name in JOINTS])

@@ -26,7 +26,7 @@ This is one level, one shield and one body of the worker, and detections are emu
 other contacts are not equalized. With true joints the shield still has its own model of the body
 around them. At a stricter level, or with another shield, the order may differ."""
 _ROW, _FRESH = "{0}.{1}.", "confirmed."
-"""Prefixes of metrics: the task and the perception setup, and statistics of fresh episodes."""
+"""Prefixes of metrics: task and perception setup, and statistics of the confirming episodes."""
 PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "tested margin [m]", 4, plain=True)
 TOWARDS = Column(
     f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [per 1,000]", 0, counted=True
@@ -95,7 +95,7 @@ def make_price_table(
     Args:
         task: id of the environment.
         eyes: setups in the order of the rows.
-        robot: description of the robot, as "the scripted robot".
+        robot: description of the robot, such as "the scripted robot".
         n_seeds: number of episodes per search step.
         level: contacts in 1,000 episodes of 10 s at which setups are compared.
         more: columns in addition to those of the documentation.
@@ -143,7 +143,7 @@ def make_tasks_table(tasks: Sequence[str]) -> Table:
 
 
 def _make_rate_columns(prefix: str) -> list[Column]:
-    """Return the columns of statistics of fresh episodes for metrics with another prefix."""
+    """Return the columns of the confirming episodes for metrics with another prefix."""
     return [
         replace(
             column,

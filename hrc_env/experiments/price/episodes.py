@@ -1,7 +1,7 @@
 """Episodes of a robot with a shield and one perception setup, and their outcomes.
 
-As in `experiments.impact`, all setups have the same seeds and workers, which ignore the robot;
-`safety.incidents` defines contacts.
+As in `experiments.impact`, all setups have the same seeds and the same workers, which ignore the
+robot. `safety.incidents` defines contacts.
 """
 
 import zlib
@@ -40,7 +40,7 @@ STEP = np.dtype([
     *((name, float) for name in (*CONTACTS, "achieved", "cost")), ("over", bool),
 ])  # fmt: skip
 """Data type of the state of an episode after a step: counts since the start of the episode, cost of
-the step, and whether the episode ended."""
+the step, and whether the episode has ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Driver:
     agent: str = SCRIPTED
     """Agent as `hrc_env.make_agent` accepts it."""
     control: str | None = None
-    """Control mode of the agent if its file does not name one; None: the default."""
+    """Control mode of the agent if the agent's file does not name one; None: the default."""
     trust: bool = False
     """Whether pickles in the agent's checkpoint may be loaded, as in `make_agent`."""
 
@@ -68,7 +68,7 @@ class Driver:
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of the agent on which episodes depend, for JSON.
+        """Return the settings of the agent on which episodes depend, as JSON values.
 
         They are empty for the default agent with the default control mode.
         """
@@ -128,7 +128,7 @@ def play_episodes(
         driver: the agent.
         seeds: seeds of the episodes.
         margin_m: margin added to the shield's distances [m].
-        tick: callback that receives the increase of the completed share.
+        tick: callback that receives the increase of the completed fraction.
     """
     with closing(EpisodeRunner(eyes, task, n_steps, is_shielded, driver)) as runner:
         return runner.play(seeds, margin_m, tick)

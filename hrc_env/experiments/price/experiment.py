@@ -1,4 +1,4 @@
-"""The price study: all perception setups, each with the margin for the same rate of contacts."""
+"""The price study: a search for margins that give all setups the same rate of contacts."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -40,12 +40,13 @@ from hrc_env.tasks.task import Task, find_task
 from hrc_env.tracking.estimators import find_estimator
 
 QUICK_FRESH = 600
-"""Number of episodes that confirm a margin in the quick form."""
+"""Number of new episodes that confirm a margin in the quick form."""
 FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
-"""First seeds of the search, of the episodes that confirm it, and of those with rendered images."""
+"""First seeds of the search, of the episodes that confirm its margin, and of those with rendered
+images."""
 BEYOND_M = (0.05, 0.1, 0.2)
-"""Distances by which a search is successively extended if its outermost margins do not suffice
-[m]."""
+"""Distances by which a search successively extends its range if the outermost margins do not
+suffice [m]."""
 
 
 class Case(NamedTuple):
@@ -74,11 +75,11 @@ class Price:
     n_seeds: int = 300
     """Number of episodes per search step."""
     n_fresh: int = 1000
-    """Number of episodes on fresh seeds that are played with the margin found."""
+    """Number of episodes on new seeds that confirm the margin of the search."""
     n_search: int = 4
-    """Number of bisections in a search, after which margins on either side are tried, too."""
+    """Number of bisections in a search. Margins on either side are tried afterwards."""
     bracket_m: tuple[float, float] = (-0.4, 0.4)
-    """Lowest and highest margin of the initial bracket of a search [m]."""
+    """Lowest and highest margin in the initial bracket of a search [m]."""
     level: float = 30.0
     """Contacts towards the worker in 1,000 episodes of 10 s at which setups are compared."""
     n_pixels: int = 40
@@ -137,7 +138,7 @@ class Price:
 
     @property
     def n_parts(self) -> int:
-        """Greatest number of parts.
+        """Maximum number of parts.
 
         The parts are search steps, and episodes without a shield or with rendered images.
         """
@@ -148,7 +149,7 @@ class Price:
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" for other runs."""
+        """The warning on tables and figures of a quick run; "" for other runs."""
         usual, seconds = Price(), self.count_steps(self.task) * DT_S
         if self.n_seeds < usual.n_seeds or self.n_fresh < QUICK_FRESH:
             return describe_quick_run(self.n_seeds, seconds)
@@ -248,19 +249,19 @@ def make_experiment(
 
 
 def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generator[Part, Rows, Row]:
-    """Search for the margin of one perception setup, and confirm it on fresh seeds.
+    """Search for the margin of one perception setup, and confirm it on new seeds.
 
-    This generator yields the parts that it needs, one after the other, and is sent the rows of
+    This generator yields the required parts one after the other. The caller sends it the rows of
     each.
 
     Args:
         config: settings of the study.
         task: id of the environment.
         eyes: the perception setup.
-        alone: rows of the unshielded robot.
+        alone: rows of the robot without a shield.
 
     Raises:
-        HRCError: workers moved differently than with the unshielded robot.
+        HRCError: the workers' motion differs from that in the episodes without a shield.
     """
     tried: dict[float, Rows] = {}
     make_part = partial(_make_part, config, task, eyes)
@@ -277,7 +278,7 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
 
     yield from search(measure_rate, *config.bracket_m, config.level, config.n_search)
     row = yield from confirm(suppose_margin_m(tried, config.level))
-    for beyond_m in BEYOND_M:  # if fresh seeds place the level at the last margin
+    for beyond_m in BEYOND_M:  # if the new seeds put the level at an outermost margin
         end_m = float(row.evaluate(config.level)[0, 0])
         if not row.ends_at(end_m):
             return row
@@ -288,7 +289,7 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
 
 
 def _play_unshielded(config: Price, task: str) -> Part:
-    """Return the part with the episodes without a shield."""
+    """Return the part with the episodes of a robot without a shield."""
     (eyes,) = find_eyes([TRUTH])
     seeds = config.list_seeds(task, config.n_fresh, FIRST_FRESH)
     return _make_part(config, task, eyes, seeds, 0.0, is_shielded=False)
@@ -311,7 +312,7 @@ def _compare_levels(
 
 
 def _change_level(eyes: Eyes, level: str) -> Eyes:
-    """Return a setup with another perception level, which is appended to its name."""
+    """Return a setup with another perception level; the level is appended to the setup's name."""
     setup = override(eyes.setup, level=level)
     return override(eyes, name=f"{FOUR}_{level}", setup=setup)
 
@@ -367,10 +368,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
 
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:
-    """Raise `HRCError` if workers moved differently than with the unshielded robot.
-
-    Tasks in which the worker waits for the robot are exempt.
-    """
+    """Raise `HRCError` if the workers' motion differs from that in episodes without a shield."""
     if find_task(task).signal is Task.signal and row.fresh["walk"] != alone["walk"]:
         raise HRCError(
             f"In {task} workers moved differently than near other robots, so rows cannot be "

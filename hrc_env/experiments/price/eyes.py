@@ -19,7 +19,7 @@ TRUTH, FOUR, ONE = "truth", "particle", "one_camera"
 
 @dataclass(frozen=True, slots=True)
 class Eyes:
-    """The perception of a robot, and the scale of the covariances that its shield receives."""
+    """Perception of a robot, with the scale factor of the covariances that its shield receives."""
 
     name: str
     """Name of the setup in results.json."""
@@ -30,12 +30,12 @@ class Eyes:
     setup: PerceptionSetup
     """Level, estimator, cameras and latency."""
     wrong: tuple[Faults, ...] = ((),)
-    """Additional faults of cameras, over which episodes rotate."""
+    """Additional camera faults. Successive episodes use the elements in turn."""
     covariance: float = 1.0
     """Factor on the covariances that the shield receives."""
 
     def turns(self, scene: str) -> tuple[Turn, ...]:
-        """Return the cameras and faults over which episodes rotate.
+        """Return the cameras and faults that successive episodes use in turn.
 
         Args:
             scene: name of the scene that contains the cameras.

@@ -1,7 +1,7 @@
 """Metrics of the price study: the margin of each setup, and its throughput at that margin.
 
 A setup's margin is the one at which its rate of contacts equals the given level. All setups of a
-task have the same seeds, so that differences between two of them are computed draw by draw.
+task have the same seeds; differences between two setups are computed for each bootstrap draw.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ from hrc_env.experiments.stage import Rows
 N_DRAWS = 1000
 """Number of bootstrap draws."""
 EPISODE_MIN = 10.0 / 60.0
-"""Duration of the episodes in `UNIT`, even if the task has longer episodes [min]."""
+"""Duration of the episodes in `UNIT` [min], which does not depend on the task."""
 PER = 1000 * EPISODE_MIN
 """Exposure to which numbers of contacts are scaled [min]."""
 UNIT = "per 1000 episodes of 10 s"
@@ -36,7 +36,7 @@ UNIT = "per 1000 episodes of 10 s"
 
 
 class Contrast(NamedTuple):
-    """Two setups that are compared by their shares of throughput."""
+    """Two perception setups, with relative throughputs that are compared."""
 
     better: str
     worse: str
@@ -60,7 +60,8 @@ CONTRASTS: dict[str, Contrast] = {
     "truth": Contrast(TRUTH, FOUR),
     "calibration_over_accuracy": Contrast("triangulation", "all_turned_1deg"),
 }
-"""Contrasts by name; each is the share of the better setup minus that of the worse one."""
+"""Contrasts by name. A contrast is the throughput of the better setup minus that of the worse
+one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,14 +69,14 @@ class Row:
     """The episodes of one perception setup."""
 
     searched: Mapping[float, Rows]
-    """Sums of episodes, by the margins that were tried [m]."""
+    """Sums of the episodes with each margin [m] that was tried."""
     margin_m: float
-    """Margin found by the search [m]."""
+    """Margin that the search returned [m]."""
     fresh: Rows
-    """Sums of episodes with that margin on fresh seeds."""
+    """Sums of episodes with that margin on new seeds."""
 
     def evaluate(self, level: float) -> Floats:
-        """Return margin [m] and goals per minute at a level, for all draws of seeds (1 + R, 2).
+        """Return margin [m] and goals per minute at a level of contacts, for all draws (1 + R, 2).
 
         In the first draw, every seed counts once.
 
@@ -115,7 +116,7 @@ class Played:
 
 
 def suppose_margin_m(tried: Mapping[float, Rows], level: float) -> float:
-    """Return the margin at which the rate of contacts is at a level, to the millimetre [m]."""
+    """Return the margin for a level of the rate of contacts, rounded to millimetres [m]."""
     margins_m = sorted(tried)
     events, minutes = (
         np.array([np.sum(tried[m][name]) for m in margins_m]) for name in ("towards", "minutes")
@@ -173,8 +174,8 @@ def _measure_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -
     Args:
         row: the episodes of the setup.
         drawn: margin and goals per minute (1 + R, 2) at the level.
-        share: throughput (1 + R,) as a share of that of an unshielded robot.
-        truth: the same share with true joints, if these were played.
+        share: throughput (1 + R,) as a fraction of that of a robot without a shield.
+        truth: the same fraction with true joints, or None if these were not played.
     """
     n, margin_m = len(row.fresh["minutes"]), row.margin_m
     of_truth = (
@@ -191,7 +192,7 @@ def _measure_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -
 
 
 def _draw_rates(rows: Rows) -> Floats:
-    """Return the goals per minute (1 + R,) for all draws of fresh seeds."""
+    """Return the goals per minute (1 + R,) for all draws of the new seeds."""
     minutes = np.array(rows["minutes"])
     fresh = draw_seeds(1, len(minutes), N_DRAWS).fresh
     return np.asarray((fresh @ np.array(rows["achieved"], float)) / (fresh @ minutes))
@@ -212,9 +213,10 @@ def _measure_contrasts(shares: Mapping[str, Floats], n: int) -> dict[str, Metric
 
 
 def _measure_ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
-    """Return the share of draws with the order truth, four cameras, one camera, and the losses.
+    """Return the fraction of draws with the order truth, four cameras, one camera, and the losses.
 
-    The order is by decreasing throughput; a loss is the difference from one setup to the next.
+    Setups are ordered by decreasing throughput. A loss is the difference between a setup and the
+    next.
     """
     if not set(ELSEWHERE) <= shares.keys():
         return {}

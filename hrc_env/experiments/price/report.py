@@ -64,7 +64,7 @@ def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics
 
 
 def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
-    """Return a note on setups that do not reach the level at the margins tried; "" if all do."""
+    """Return a note on setups that reach the level with none of the margins; "" if all reach it."""
     margins_m = {name: metrics[f"{task}.{name}.margin_m"].value for name in rows}
     beyond = [f"`{name}`" for name, row in rows.items() if row.ends_at(margins_m[name])]
     if not beyond:

@@ -1,12 +1,12 @@
 """Search by bisection for the margin at which a rate falls to a level, and its evaluation.
 
-A search evaluates all margins on the same seeds, so that rates differ by the effect of the margin
-and not by random draws (common random numbers). It bisects a bracket a fixed number of times, and
-then tries the ends of the bracket and one margin beyond either end. Fresh seeds are played with the
-margin found. These give the height of the curve there, and the search gives its shape around it:
-y(m) = y_fresh(m_0) y_search(m) / y_search(m_0), a ratio estimator of two samples (Cochran 1977,
-Sampling Techniques, ch. 12). The seeds of the search do not affect the height of the curve, because
-they were used to choose the margin.
+A search evaluates all margins on the same seeds (common random numbers). Rates therefore differ by
+the effect of the margin and not by random draws. The search bisects a bracket a fixed number of
+times; it then tries the ends of the bracket and one margin beyond either end. Episodes on new seeds
+are played with the resulting margin. They determine the height of the curve at that margin, and the
+search determines its shape: y(m) = y_new(m_0) y_search(m) / y_search(m_0), a ratio estimator of two
+samples (Cochran 1977, Sampling Techniques, ch. 12). The seeds of the search do not affect the
+height of the curve, because they were used to choose the margin.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -24,7 +24,7 @@ RequestT = TypeVar("RequestT")
 AnswerT = TypeVar("AnswerT")
 ResultT = TypeVar("ResultT")
 HALF = 0.5
-"""Number of events added to counts before their logarithm is taken."""
+"""Number of events added to a count before its logarithm is computed."""
 
 
 def search(
@@ -37,7 +37,7 @@ def search(
     """Evaluate a decreasing rate at `n_steps` bisections of a bracket and at arguments nearby.
 
     Args:
-        rate: generator function that evaluates the rate at an argument; its requests are yielded.
+        rate: generator function that evaluates the rate at an argument. Its requests are yielded.
         low: lower end of the bracket.
         high: upper end of the bracket.
         level: level to which the rate falls.
@@ -69,7 +69,7 @@ def run_together(
     """Run searches in parallel, one step of each per round, and return their results.
 
     Args:
-        searches: generators that yield requests and are sent the answers.
+        searches: generators that yield requests and receive the answers by `send`.
         answer: function that returns the answers to all requests of a round, in their order.
     """
     results: dict[int, ResultT] = {}
@@ -93,7 +93,7 @@ def fit_falling_rates(events: Floats, minutes: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class MarginSearch:
-    """Sums of the episodes of a search, one column per seed."""
+    """Sums of the episodes of a search and of those on new seeds, with one column per seed."""
 
     margins_m: Floats
     """Margins (K,) in increasing order [m]."""
@@ -104,23 +104,23 @@ class MarginSearch:
     minutes: Floats
     """Durations (K, n) [min]."""
     fresh_margin_m: float
-    """Margin with which the fresh seeds were played [m]."""
+    """Margin with which the episodes on new seeds were played [m]."""
     fresh_events: Floats
-    """Numbers of events (m,) on fresh seeds."""
+    """Numbers of events (m,) on the new seeds."""
     fresh_achieved: Floats
-    """Numbers of goals (m,) on fresh seeds."""
+    """Numbers of goals (m,) on the new seeds."""
     fresh_minutes: Floats
-    """Durations (m,) of the episodes on fresh seeds [min]."""
+    """Durations (m,) of the episodes on the new seeds [min]."""
 
     def evaluate(self, level_per_min: float, drawn: Ints, fresh: Ints) -> Floats:
         """Return the margin [m] at which events fall to a level, and goals per minute there (R, 2).
 
-        A margin beyond those that were tried is replaced by the outermost of them.
+        A margin outside the range of the tried margins is replaced by the nearest of these.
 
         Args:
             level_per_min: level of the rate [events per minute].
             drawn: number of times (R, n) that each seed of the search counts.
-            fresh: number of times (R, m) that each fresh seed counts.
+            fresh: number of times (R, m) that each new seed counts.
         """
         m, m_0, level = self.margins_m, self.fresh_margin_m, np.log(level_per_min)
         minutes, fresh_minutes = drawn @ self.minutes.T, fresh @ self.fresh_minutes
@@ -136,16 +136,16 @@ class MarginSearch:
 
 
 class SeedWeights(NamedTuple):
-    """The number of times that each seed counts in 1 + R draws; in the first, each counts once."""
+    """Number of times that each seed counts in 1 + R draws; in the first, each counts once."""
 
     search: Ints
     """Weights (1 + R, n) of the seeds of the search."""
     fresh: Ints
-    """Weights (1 + R, m) of the fresh seeds."""
+    """Weights (1 + R, m) of the new seeds."""
 
 
 def draw_seeds(n: int, m: int, n_draws: int) -> SeedWeights:
-    """Return draws of n seeds of a search and of m fresh seeds, which are the same in every call.
+    """Return draws of n seeds of a search and of m new seeds; they are the same in every call.
 
     Rows that share their seeds can therefore be compared draw by draw.
     """

@@ -8,19 +8,19 @@ from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.safety.shield import SHIELDS
 
 SHIELD = "qp"
-"""Name of the shield that gets the margin."""
+"""Name of the shield to which the margin is added."""
 
 
 @dataclass(slots=True)
 class Widened:
-    """The shield `SHIELD` for a robot with capsules that are thickened by a margin.
+    """The shield `SHIELD` for a robot with capsule radii that are increased by a margin.
 
-    All protective distances therefore grow by the margin, which may be negative. The shield
+    All protective distances therefore change by the margin, which may be negative. The shield
     receives the estimator's covariances multiplied by `covariance`.
     """
 
     covariance: float = 1.0
-    """Factor on the covariances."""
+    """Factor by which the estimator's covariances are multiplied."""
     margin_m: float = 0.0
     """Margin [m], which may be changed between episodes."""
 

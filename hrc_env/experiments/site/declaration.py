@@ -16,14 +16,15 @@ four-camera track): of one camera or four from the first frame on, as in the pap
 second and then of some. Errors are of every frame after that second, including those of lost
 tracks."""
 ESTIMATORS = ("particle", "paper")
-"""Default estimators, which are also evaluated with single cameras from the first frame on, and
-with crops that follow the estimator itself."""
+"""Default estimators. They are also evaluated with single cameras from the first frame on, and with
+crops that follow the estimator itself."""
 ALSO = ("kalman", "paper_restarts")
-"""Further estimators that are replayed on the film, among them the best one for one camera."""
+"""Further estimators that are replayed on the film; they include the best one for a single
+camera."""
 PAPER_RMSE_M = {
     "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
 }  # fmt: skip
-"""RMSE that the paper reports; the unit is not printed, metres are assumed."""
+"""RMSE that the paper reports [m]. The paper does not state the unit; metres are assumed."""
 COLUMNS = [Column(f"{{}}.{c}", f"{words} [m]", 3) for c, words in CAMERA_LABELS.items()]
 NUMBERS = {
     "over_best": Column("over_multi.particle.camera_4", "", 0, plain=True),
@@ -33,7 +34,7 @@ NUMBERS = {
 
 
 def list_estimators(estimators: tuple[str, ...]) -> tuple[str, ...]:
-    """Return all estimators that are replayed on the film, beginning with the requested ones."""
+    """Return all estimators that are replayed on the film; the requested ones come first."""
     return tuple(dict.fromkeys((*estimators, *ALSO)))
 
 
@@ -72,7 +73,7 @@ class Comparisons(NamedTuple):
     differences: Table
     """Differences from the first estimator."""
     ratios: Table
-    """Errors of one camera divided by those of four."""
+    """Errors with one camera divided by errors with four."""
 
 
 def make_comparison_tables(estimators: tuple[str, ...]) -> Comparisons:

@@ -1,4 +1,4 @@
-"""The site study, which films walks once and replays all estimators on the same film."""
+"""The site study, which films walks once and replays all estimators on the same films."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -29,13 +29,16 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS as KNOWN
 
 HEAD = JOINT["nose"]
-"""The paper's "head", for which MediaPipe has no joint (judgement: the nose)."""
+"""Index of the joint that represents the paper's "head", for which MediaPipe has no joint. The
+choice of the nose is an assumption."""
 CROPS = "particle"
 """Name of the estimator that the crops of the shared film follow."""
 SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
-"""Configuration with a wide prior, as walks lead far from the centre of the workplaces."""
+"""Configuration with a wide prior, because walks lead far away from the centre of the
+workplaces."""
 ALONE = "alone."
-"""Prefix of keys if only a row's cameras are used from the first frame on, as in the paper."""
+"""Prefix of results in which only the row's cameras are used from the first frame on, as in the
+paper."""
 ROWS = tuple(CHOICES)
 """Names of the rigs: each camera alone, and all four."""
 
@@ -53,10 +56,10 @@ class Site:
     seconds: float = 20.0
     """Duration of a walk [s]."""
     estimators: tuple[str, ...] = ESTIMATORS
-    """Estimators in the table, which are also evaluated with crops that follow them."""
+    """Estimators in the table. They are also evaluated with crops that follow them."""
     n_closed: int = 2
-    """Number of walks that are filmed again with crops that follow each estimator; these take most
-    of the time."""
+    """Number of walks that are filmed again with crops that follow each estimator. These films take
+    most of the time."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""
@@ -77,13 +80,13 @@ class Site:
 
     @property
     def n_parts(self) -> int:
-        """Number of shared films, and of those with crops that follow an estimator."""
+        """Number of shared films plus number of films with crops that follow an estimator."""
         n_closed = len(self.seeds[: self.n_closed])
         return self.n_seeds + len(self.estimators) * len(ROWS) * n_closed
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" for other runs."""
+        """The warning on tables and figures of a quick run; "" for other runs."""
         is_short = is_as_short(self, QUICK)
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
@@ -120,7 +123,7 @@ class Site:
 
 
 QUICK = Site(n_seeds=2, seconds=6.0, n_closed=1)
-"""The quick form, with fewer and shorter walks."""
+"""The quick form of the study, with fewer and shorter walks."""
 
 
 def make_experiment(
@@ -132,16 +135,16 @@ def make_experiment(
 
 
 Walk = Mapping[str, Any]
-"""A finished part: paths of the head by name."""
+"""Result of a completed part: paths of the head, by name."""
 
 
 class Played(NamedTuple):
     """All walks of the study."""
 
     films: Mapping[int, Walk]
-    """Shared films with the estimates of all estimators, by seed."""
+    """Films with shared crops, with the estimates of all estimators, by seed."""
     closed: Mapping[str, Mapping[int, Walk]]
-    """Walks with crops that follow the estimator, by row and seed."""
+    """Walks with crops that follow the estimator, by the row of the results and by seed."""
 
 
 def film_walk(config: Site, seed: int, tick: PartProgress) -> dict[str, Any]:
@@ -172,7 +175,7 @@ def film_own_crops(
 ) -> dict[str, Any]:
     """Film a walk with crops that follow an estimator, and return its estimates.
 
-    The cameras that are not in the row fail after the warm-up.
+    The cameras that do not belong to the row fail after the warm-up.
     """
     settings = replace(SETTINGS, faults=make_turns("site", [CHOICES[row]])[0].faults)
     motions = walk(make_site(), seed, round(config.seconds / DT_S), DT_S)
@@ -223,7 +226,7 @@ def compute_metrics(config: Site, played: Played) -> dict[str, Metric]:
 def _square_m2(film: Walk, row: Walk) -> Floats:
     """Return the squared errors (T,) of the head in the frames that are evaluated [m^2].
 
-    If the track is lost, the estimator's last estimate, or its prior, is evaluated.
+    If the track is lost, the last estimate or the prior is evaluated.
     """
     off_m = np.array(row["head"], float) - np.array(film["truth"], float)
     return (off_m**2).sum(-1)[film["judged_from"] :]

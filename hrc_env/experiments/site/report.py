@@ -1,4 +1,4 @@
-"""The report of the site study: the paper's figures 3 and 4 with data of the study, and tables."""
+"""The report of the site study: tables, and the paper's figures 3 and 4 with the study's data."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 
 ABOVE_PX, VIEW_PX = (1100, 1100), (960, 540)
-"""Sizes of the picture from above and of the cameras' pictures [px]."""
+"""Sizes of the picture from above and of the cameras' pictures, (width, height) [px]."""
 LIMIT_M = 10.0
 """Half the side of the site [m]."""
 
@@ -67,7 +67,7 @@ def make_report(
 
 
 def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
-    """Draw the site from above with its cameras and the first walk, and the view of each camera.
+    """Draw the site from above with its cameras and the first walk, and the view from each camera.
 
     Args:
         path: picture file to write.

@@ -20,9 +20,9 @@ PASSING = MotionConfig(
     jobs=tuple(Job(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
     people=generator.PEOPLE["unaware"],
 )
-"""Settings of motion with which workers leave each workplace as soon as they reach it.
+"""Motion settings with which workers leave each workplace as soon as they reach it.
 
-They are a judgement: the paper only states that the worker walked.
+The values are assumptions, because the paper states only that the worker walked.
 """
 
 

@@ -1,4 +1,4 @@
-"""Climbing a step or low ladder and descending backwards; looking round on the spot."""
+"""Climbing a step or low ladder and descending backwards, and looking round on the spot."""
 
 import math
 
@@ -12,24 +12,24 @@ from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang
 from hrc_env.motion.state import Worker
 
 HIGHEST_RISER_M = 0.32
-"""Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
+"""Maximum rise of one step [m]; the rungs of ladders are 0.25 to 0.30 m apart (EN 131-1)."""
 FIRST_M = 0.40
 """Distance from the initial stance to the first tread [m]."""
 TREAD_M = 0.24
-"""Distance from tread to tread [m]."""
+"""Horizontal distance from tread to tread [m]."""
 STEP_AT_S = 0.12
-"""Time at which a climber's first foot lifts off [s]; judgement."""
+"""Time at which a climber's first foot lifts off [s]. The value is an estimate."""
 PERIOD_S = 0.72
-"""Period of a climber's steps [s]; judgement."""
+"""Period of a climber's steps [s]. The value is an estimate."""
 SWING_S = 0.56
-"""Swing time of a climber's foot [s]; judgement."""
+"""Swing time of a climber's foot [s]. The value is an estimate."""
 TURN_S = 0.75
-"""Time to turn the head from one side to the other [s]; judgement."""
+"""Time to turn the head from one side to the other [s]. The value is an estimate."""
 
 
 @kernel
 def climb(t: float, worker: Worker) -> None:
-    """Add a climb to the pose of a standing worker: up, a stay, and down in reverse.
+    """Add a climb to the pose of a standing worker: climb up, stay, and descend in reverse.
 
     Args:
         t: time since the activity began [s].
@@ -52,11 +52,11 @@ def climb(t: float, worker: Worker) -> None:
 
 @kernel
 def start_climb(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to climb to a height and come down again.
+    """Plan to climb to a height and descend again.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height to climb to [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height to climb to [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -95,11 +95,11 @@ def look_round(t: float, worker: Worker) -> None:
 
 @kernel
 def start_look_round(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to look to both sides; the height has no effect.
+    """Plan to look to both sides.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m].
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: unused; part of the interface of start functions.
         worker: record into which the plan is written.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Falling in a walk: a foot is caught, and hands, knees and trunk come down to the floor.
+"""Falling during a walk: a foot is caught, and hands, knees and trunk come down to the floor.
 
 The worker lies on the floor, and gets up via hands and knees and one foot. `POSES` are
 interpolated by the monotone cubic of Fritsch & Butland (1984, doi:10.1137/0905021), which does
@@ -32,28 +32,32 @@ from hrc_env.motion.walk import (
 )
 
 _STEPS_BEFORE, _STEPS_AFTER = 2, 3
-"""Least numbers of steps of a walk before and after the step in which a foot is caught."""
+"""Minimum numbers of steps of a walk before and after the step in which a foot is caught."""
 _LAST_STEPS = 2
-"""Number of footprints that a fall adds after that of the caught foot, for standing up again."""
+"""Number of footprints after that of the caught foot that are added for standing up again."""
 PELVIS_X, PELVIS_Z, PITCH, ROLL, FLEX, NOD, TURN, GRASP, ELBOWS, KNEES = range(10)
-"""Columns of `PLACES` for the trunk, in radians, and in metres for a leg of length `LEG_M`.
+"""Columns of `PLACES` for the trunk.
 
-They are: position of the pelvis ahead of the stumble, its height and pitch; share of lying on a
-side; flexion of the spine; pitch and yaw of the head; share by which the hands follow their
-targets; degrees to which elbows and knees point outwards.
+They are: distance of the pelvis ahead of the stumble and its height, for a leg of length `LEG_M`
+[m]; pitch of the pelvis [rad]; degree of lying on a side (0 to 1); flexion of the spine [rad];
+pitch and yaw of the head [rad]; degrees to which the hands follow their targets, and to which
+elbows and knees point outwards (0 to 1).
 """
 HANDS = 10
-"""First of three columns per hand: ahead, outwards, height; the side of the rising foot first."""
+"""First of three columns per hand: ahead, outwards, height [m].
+
+The hand on the side of the rising foot comes first.
+"""
 FEET = 16
 """First of five columns per foot: those of the rising foot, then those of the other foot.
 
-They are: position of the ball of the foot ahead, outwards, and above that of a standing foot;
-pitch of the foot and of the toes.
+They are: position of the ball of the foot ahead, outwards, and above that of a standing foot [m];
+pitch of the foot and of the toes [rad].
 """
 FREED = 26
-"""Column of the share by which the feet have left their footprints."""
+"""Column of the degree to which the feet have left their footprints (0 to 1)."""
 RISEN = 27
-"""First of two columns: share by which each foot stands at its final footprint."""
+"""First of two columns: degree to which each foot has reached its final footprint (0 to 1)."""
 _PUSHED, _STEM = (1.42, 0.38, 0.12), (1.42, 0.36, 0.14)
 POSES = np.array([
     # time, pelvis x z, pitch, roll, flex, nod, turn, grasp, elbows, knees, hands, feet, shares
@@ -84,13 +88,13 @@ POSES = np.array([
     (5.70, 1.22, 0.957, 0.02, 0, 0.05, 0.05, 0.0, 0, 0.2, 0.0, 1.42, 0.22, 0.84, 1.2, 0.36, 0.74,
      1.30, 0.12, 0.0, 0.0, 0.0, 1.30, 0.12, 0.0, 0.0, 0.0, 1, 1, 1),
 ])  # fmt: skip
-"""Key poses of a fall: time [s], followed by the columns of `PLACES`."""
+"""Key poses of a fall, with the time [s] in the first column before those of `PLACES`."""
 TIMES_S = POSES[:, 0].copy()
 """Times of the key poses [s]."""
 PLACES = POSES[:, 1:].copy()
 """Key poses without their times."""
 LIES_S = 1.2
-"""Time in `POSES` at which the worker lies [s]."""
+"""Time in `POSES` at which the worker lies on the floor [s]."""
 STANDS_S = 5.7
 """Time in `POSES` at which the worker stands again [s]."""
 THROWN_S = 0.32
@@ -98,26 +102,29 @@ THROWN_S = 0.32
 ERECT_S = 0.7
 """Time of the transition from the last key pose to standing [s]."""
 CAUGHT_AT = 0.7
-"""Share of the caught foot's swing at which it is caught; judgement."""
+"""Completed fraction of the swing at which the foot is caught. The value is an estimate."""
 CAUGHT_LEGS = 0.14
-"""Distance by which the caught foot lands ahead of the other, in leg lengths; judgement."""
+"""Distance by which the caught foot lands ahead of the other, in leg lengths.
+
+The value is an estimate.
+"""
 RISES_AT = 1.22
-"""Distance from the stumble to the final standing position, in the lengths of `POSES`."""
+"""Distance from the stumble to the final standing position, in the unit of length of `POSES`."""
 TALL = 1.7
-"""Reach of head and hands from the stumble, in the lengths of `POSES`."""
+"""Maximum distance of head and hands from the stumble, in the unit of length of `POSES`."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
-"""Directions of a fall relative to the heading, tried in turn until there is room [rad]."""
+"""Directions of a fall relative to the heading [rad], tried in turn until there is room."""
 QUICKEST = 1.15
-"""Greatest rate of a fall relative to `POSES`."""
+"""Maximum speed of a fall relative to `POSES`."""
 SLOWEST = 0.9
-"""Least rate of a fall relative to `POSES`."""
+"""Minimum speed of a fall relative to `POSES`."""
 MOST_ROLL_RAD = 0.9
-"""Greatest roll of a lying trunk onto a side [rad]."""
+"""Maximum roll of a lying trunk to a side [rad]."""
 
 
 @kernel
 def _find_slope(k: int, column: int) -> float:
-    """Return the slope of a column at key pose k."""
+    """Return the rate of change of a column of `PLACES` at key pose k [1/s]."""
     if k == 0 or k == PLACES.shape[0] - 1:
         return 0.0
     before, after = TIMES_S[k] - TIMES_S[k - 1], TIMES_S[k + 1] - TIMES_S[k]
@@ -131,7 +138,7 @@ def _find_slope(k: int, column: int) -> float:
 
 @kernel
 def _interpolate(at: float, column: int) -> float:
-    """Interpolate a column of `PLACES` at a time of `POSES` [s]."""
+    """Return a column of `PLACES`, interpolated at a time of `POSES` [s]."""
     k = 0
     while k < PLACES.shape[0] - 2 and TIMES_S[k + 1] <= at:
         k += 1
@@ -144,19 +151,20 @@ def _interpolate(at: float, column: int) -> float:
 
 @kernel
 def _to_pose_time(since: float, worker: Worker) -> float:
-    """Convert the time [s] since the foot was caught to the time in `POSES` [s]."""
+    """Convert the time since the foot was caught [s] to the time in `POSES` [s]."""
     down = worker.fall_pace * since
     return min(down, LIES_S) + max(since - LIES_S / worker.fall_pace - worker.lie_s, 0.0)
 
 
 @kernel
 def fall(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of walking, falling and getting up again.
+    """Compute the control vector of walking, falling and getting up again.
 
     Args:
         t: time since the activity began [s].
         clock_s: time since the episode began [s].
-        worker: record with the plan; its `q`, which holds the walking feet, is written.
+        worker: record with the plan; its `q`, which contains the pose of the walking feet, is
+            written.
     """
     at = _to_pose_time(t - worker.trip_at, worker)
     if at <= LIES_S:
@@ -184,7 +192,7 @@ def fall(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _fall_trunk(at: float, share: float, worker: Worker) -> None:
-    """Blend root, pelvis, spine and head with those of the fall.
+    """Blend the poses of root, pelvis, spine and head with those of the fall.
 
     Args:
         at: time in `POSES` [s].
@@ -210,7 +218,7 @@ def _fall_trunk(at: float, share: float, worker: Worker) -> None:
 
 @kernel
 def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -> None:
-    """Move a foot from its footprint onto the ball, with the body, and to its final footprint.
+    """Move a foot from its footprint, with the falling body, to its final footprint.
 
     Args:
         at: time in `POSES` [s].
@@ -250,19 +258,19 @@ def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -
 def plan_fall(
     draws: Floats, end_yaw: float, pace_m_s: float, lie_s: float, grid: FloorGrid, worker: Worker
 ) -> float:
-    """Plan a walk along the worker's path with a fall on the way, and getting up again.
+    """Plan a walk along the worker's path in which the worker falls and gets up again.
 
-    The steps are tried cyclically from a random one on, each in the directions `TURNS_RAD`, until
-    the floor has room for a fall.
+    Beginning with a random step, the steps are tried cyclically, each in the directions
+    `TURNS_RAD`, until the floor has room for a fall.
 
     Args:
-        draws: (N_START,) uniform draws in [0, 1): 0 the step, 1 the rate of the fall, 2 the roll of
-            the lying trunk, 3 the foot on which the worker gets up first.
-        end_yaw: heading at the end of the path [rad], in the world frame.
+        draws: uniform random numbers (N_START,) in [0, 1); 0 to 3 select the step, the rate of the
+            fall, the roll of the lying trunk, and the foot on which the worker gets up first.
+        end_yaw: heading at the end of the path, in the world frame [rad].
         pace_m_s: walking speed [m/s].
         lie_s: time for which the worker lies on the floor [s].
         grid: slack on the floor.
-        worker: record with the path; the plan is written into it, even if a fall has no room.
+        worker: record with the path; the plan is written into it, even if there is no room.
 
     Returns:
         The duration [s]; -1 if there is no room for a fall, or the path is too short or too long.
@@ -330,7 +338,7 @@ def _plan_stumble(step: int, turn: float, grid: FloorGrid, worker: Worker) -> bo
 
 @kernel
 def predict_fallen_root(t: float, worker: Worker) -> Point:
-    """Predict the approximate root on the floor at time t of a fall, also after its end."""
+    """Predict the approximate position of the root at time t of a fall, also after its end."""
     at = _to_pose_time(t - worker.trip_at, worker)
     if at <= 0.0:
         return locate_on_path(measure_travel(t, worker), worker)

@@ -1,4 +1,4 @@
-"""Locomotion other than plain walking: turns, stumbles, steps back, and pushing a cart."""
+"""Locomotion other than normal walking: turns, stumbles, steps back, and pushing a cart."""
 
 import math
 
@@ -25,11 +25,11 @@ CART_AHEAD_M = 0.47
 WHEELBARROW_AHEAD_LEGS = 0.26
 """Distance of a level wheelbarrow's handles ahead of the root, in leg lengths."""
 PUSHING_SHARE = 0.99
-"""Extension of the arms in pushing, as a share of their length."""
+"""Extension of the arms during pushing, as a fraction of their length."""
 STOOPED_M = 0.4
 """Forward displacement of the shoulders at a lean of 1 [m]."""
 CART_LEAN = 0.06
-"""Least lean in pushing a cart."""
+"""Minimum lean while a cart is pushed, as defined in `posture.lean`."""
 WHEEL_AHEAD_M = 1.2
 """Distance of a wheelbarrow's axle ahead of its origin [m]."""
 WHEEL_UP_M = 0.17
@@ -37,19 +37,22 @@ WHEEL_UP_M = 0.17
 STANDS_RAD = 0.2
 """Pitch of a wheelbarrow that stands on its legs [rad]."""
 KNUCKLES_SHARE = 0.97
-"""Height of a wheelbarrow's raised handles as a share of pelvis height."""
+"""Height of a wheelbarrow's raised handles, as a fraction of pelvis height."""
 BEND = 1.3
-"""Lean to grasp the handles of a wheelbarrow; judgement."""
+"""Lean with which the handles of a wheelbarrow are grasped. The value is an estimate."""
 TAKE_S = 0.7
 """Time for the hands to reach the handles [s]."""
 LIFT_S = 0.5
 """Time to lift a wheelbarrow by its handles [s]."""
 STEP_BACK_PACE = Pace(0.0, 0.62, 0.42)
-"""Pace of quick steps back; judgement."""
+"""Pace of quick steps back. The values are estimates."""
 TURN_PACE = Pace(0.0, 0.2, 0.36)
-"""Pace of turning on the spot, slow enough that the feet do not collide; judgement."""
+"""Pace of turning on the spot, sufficiently slow to prevent collisions of the feet.
+
+The values are estimates.
+"""
 CAUGHT_LEGS = 0.115
-"""Shortening of the step in which a foot is caught, in leg lengths; judgement."""
+"""Shortening of the step in which a foot is caught, in leg lengths. The value is an estimate."""
 
 
 @kernel(makes_arrays=True)
@@ -62,11 +65,11 @@ def start_turn(yaw: float, worker: Worker) -> float:
 
 @kernel(makes_arrays=True)
 def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to step straight back without looking; the height has no effect.
+    """Plan to step straight back with an unchanged heading.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m].
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: unused; part of the interface of start functions.
         worker: record into which the plan is written.
 
     Returns:
@@ -83,7 +86,7 @@ def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, worker: Worke
     """Plan a walk along the worker's path in which a foot is caught.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         end_yaw: heading at the end [rad].
         speed_m_s: top speed [m/s].
         worker: record with the path; the plan is written into it.
@@ -147,7 +150,7 @@ def _plan_handles(prop: int, worker: Worker) -> None:
 
 @kernel
 def push(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of grasping, pushing and releasing a cart, except for the feet.
+    """Compute the control vector of grasping, pushing and releasing a cart, except for the feet.
 
     Args:
         t: time since the activity began [s].
@@ -179,7 +182,12 @@ def push(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _tilt_point(back_rad: float, z: float) -> SagittalShift:
-    """Return the displacement of a wheelbarrow's point at height z [m] when it tilts back."""
+    """Return the displacement of a point of a wheelbarrow that is tilted back.
+
+    Args:
+        back_rad: angle of the tilt [rad].
+        z: height of the point above the wheelbarrow's origin [m].
+    """
     cos, sin = math.cos(back_rad), math.sin(back_rad)
     above = z - WHEEL_UP_M
     ahead = WHEEL_AHEAD_M * (1.0 - cos) - above * sin

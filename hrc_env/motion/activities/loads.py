@@ -1,7 +1,7 @@
-"""Handling of loads: picking up and, in reverse, setting down; receiving and handing over.
+"""Handling of loads: picking up, setting down, receiving and handing over.
 
-In recorded lifts the pelvis is 0.57 to 1.01 m high, and in the median trial the wrists move at
-1.3 m/s at most.
+Setting down is picking up in reverse. In recorded lifts, the pelvis is 0.57 to 1.01 m high, and the
+maximum speed of the wrists is 1.3 m/s in the median trial.
 """
 
 import math
@@ -24,34 +24,40 @@ from hrc_env.world import AWAY_M
 BOX = PROP_NAMES.index("box")
 BOARD = PROP_NAMES.index("board")
 BOX_AHEAD_M = 0.37
-"""Distance of a held box ahead of the root [m]; judgement."""
+"""Distance of a held box ahead of the root [m]. The value is an estimate."""
 BOX_HEIGHT = 1.10
-"""Height of a held box as a multiple of pelvis height; judgement."""
+"""Height of a held box, as a multiple of pelvis height. The value is an estimate."""
 BOARD_AHEAD_M = 0.27
-"""Distance of a held board ahead of the root [m]; judgement."""
+"""Distance of a held board ahead of the root [m]. The value is an estimate."""
 BOARD_HEIGHT = 0.96
-"""Height of a held board as a multiple of pelvis height; judgement."""
+"""Height of a held board, as a multiple of pelvis height. The value is an estimate."""
 GIVEN_AHEAD_M = 0.60
-"""Distance ahead of the root of a load that is handed over [m]; judgement."""
+"""Distance ahead of the root of a load that is handed over [m]. The value is an estimate."""
 GIVEN_HEIGHT = 1.14
-"""Height of a load that is handed over, as a multiple of pelvis height; judgement."""
-CARRYING_SHARE = 0.95
-"""Greatest extension of carrying arms, as a share of their length; judgement.
+"""Height of a load that is handed over, as a multiple of pelvis height.
 
-The rest is a reserve for the swinging trunk.
+The value is an estimate.
+"""
+CARRYING_SHARE = 0.95
+"""Maximum extension of carrying arms, as a fraction of their length.
+
+The value is an estimate; the difference from 1 is a reserve for the swinging trunk.
 """
 ON_SHOULDER_M = (0.12, 0.165, 0.075)
-"""Position of a board on the shoulder: ahead of and beside the root, above the shoulder [m]."""
+"""Position of a board on the shoulder [m]: ahead of and beside the root, above the shoulder."""
 STEADY_M = 0.26
-"""Distance of the steadying hand from the middle of a board on the shoulder [m]; judgement."""
+"""Distance of the steadying hand from the middle of a board on the shoulder [m].
+
+The value is an estimate.
+"""
 NOSE_UP_RAD = 0.08
-"""Pitch of a board on the shoulder, with its front end up [rad]; judgement."""
+"""Pitch of a board on the shoulder, with its front end up [rad]. The value is an estimate."""
 CROUCH_M = 0.15
-"""Height of a load that is gripped in a full squat [m]; judgement."""
+"""Height of a load that is gripped in a full squat [m]. The value is an estimate."""
 BENT_M = 0.45
-"""Height of a load that is gripped by bending the trunk only [m]; judgement."""
+"""Height of a load that is gripped by bending the trunk only [m]. The value is an estimate."""
 GAZE_PAST_M = 0.35
-"""Distance beyond the load at which a squatting worker, with the head over it, looks [m]."""
+"""Distance from a load to the point beyond it at which a squatting worker looks [m]."""
 GRIP_S = 0.3
 """Time to grip a load [s]."""
 SHOULDER_S = 1.0
@@ -60,7 +66,7 @@ SHOULDER_S = 1.0
 
 @kernel
 def pick_up(t: float, worker: Worker) -> None:
-    """Add picking up to the pose of a standing worker: bend down, grip the load, raise it.
+    """Add picking up a load to the pose of a standing worker: bend down, grip and raise it.
 
     Args:
         t: time since the activity began [s].
@@ -99,8 +105,8 @@ def plan_pick_up(
     """Plan to pick up a box or board.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the grips [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the grips [m]; 0 for a random height.
         prop: kind of the load, an index into `PROPS`.
         on_shoulder: whether to carry a board on the shoulder.
         worker: record into which the plan is written.
@@ -119,7 +125,7 @@ def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to receive a box that another person holds out.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the box [m]; 0 for the usual height.
         worker: record into which the plan is written.
 
@@ -134,11 +140,11 @@ def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to set down the load that is held.
+    """Plan to set down the held load.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the grips at rest [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the grips at rest [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -154,7 +160,7 @@ def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to hold out the load until another person takes it.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: uniform random numbers (N_START,) in [0, 1).
         height: height of the load [m]; 0 for the usual height.
         worker: record into which the plan is written.
 
@@ -168,7 +174,7 @@ def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def _find_handover_point(height: float, worker: Worker) -> Vector3:
-    """Return the position of a handover relative to the worker: ahead, left, height [m]."""
+    """Return the position of a handover relative to the worker: ahead, to the left, height [m]."""
     usual = GIVEN_HEIGHT * worker.lengths[STAND_Z]
     return Vector3(GIVEN_AHEAD_M, 0.0, height if height > 0.0 else usual)
 
@@ -207,7 +213,13 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
 
 @kernel
 def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
-    """Plan the position of a load at rest: ahead, to the left, height [m]."""
+    """Plan the position of a load at rest.
+
+    Args:
+        prop: kind of the load, an index into `PROPS`.
+        at: position relative to the worker: ahead, to the left, height [m].
+        worker: record into which the plan is written.
+    """
     to.clear_plan(worker)
     to.plan_tool(prop, 1, at, Vector3(0.0, 0.0, 0.0), worker)
     to.plan_gaze(at, worker)
@@ -215,7 +227,7 @@ def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
 
 @kernel
 def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
-    """Plan the pose (6,) in the world at which the load is picked up or laid down."""
+    """Plan to pick up or lay down the load at a pose (6,) in the world frame."""
     for i in range(6):
         worker.tool_pose[i] = pose_world[i]
     worker.tool_pose[3] = worker.start_yaw + wrap(pose_world[3] - worker.start_yaw)
@@ -225,7 +237,7 @@ def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
 
 @kernel
 def finish_lift(raise_s: float, worker: Worker) -> float:
-    """Complete the plan of a load: trunk, path and durations.
+    """Complete the plan of handling a load by its path, the lean of the trunk and durations.
 
     Args:
         raise_s: time in which the load is raised by a metre [s].

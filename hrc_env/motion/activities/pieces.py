@@ -1,6 +1,6 @@
-"""Pieces of clips that begin and end on both feet, and for which the scene has room.
+"""Pieces of clips that begin and end with both feet on the floor and have room in the scene.
 
-After a job a worker plays a piece on the spot, or goes to a place with room for it
+After a job, a worker plays a piece on the spot or goes to a location with room for it
 (`setting_out.begin_clip`).
 """
 
@@ -22,32 +22,32 @@ from hrc_env.motion.floorplan import FloorGrid, Floorplan, locate_beside_robot, 
 from hrc_env.motion.state import Worker
 
 LONGEST_S = 20.0
-"""Duration of the longest piece; longer clips are cut [s]."""
+"""Maximum duration of a piece [s]; longer clips are cut."""
 SHORTEST_S = 0.5
-"""Duration of the shortest piece [s]."""
+"""Minimum duration of a piece [s]."""
 EDGE_SHARE = 0.15
-"""Share of a piece by which an end may be trimmed, up to `SHORTEST_S`, to end on flat feet."""
+"""Fraction of a piece by which each end may be trimmed for flatter feet, up to `SHORTEST_S`."""
 LOW_M = 0.05
-"""Greatest height of the higher foot at the beginning and end of a piece [m].
+"""Maximum height of the higher foot at the beginning and end of a piece [m].
 
-In a walk one foot pushes off behind while the other lands.
+The limit admits walks, in which one foot pushes off while the other lands.
 """
 UNLOADED_RAD = 0.5
 """Penalty, in tilt of the feet, for beginning or ending a piece without both feet loaded [rad]."""
 TURNS_RAD = (0.0, 0.6, -0.6, 1.2, -1.2)
-"""Headings of a clip relative to the worker's that are tried, limited to two steps' turn [rad]."""
+"""Headings of a clip relative to the worker's, tried in turn [rad]; two steps limit the turn."""
 SPARE_M = 0.05
-"""Reserve in the room for a piece, because workers stand slightly off their places [m]."""
+"""Additional slack around a piece, for deviations of workers from their workplaces [m]."""
 ENOUGH = 0.1
-"""Share of the places at which a piece should have room, if possible."""
+"""Fraction of the starting poses at which a piece should have room, if possible."""
 ROBOT_RADII = np.linspace(0.0, 1.0, 3)
-"""Candidate places at the robot: shares of the range of the radius."""
+"""Distances of starting poses at the robot, as fractions of the range of the distance."""
 ROBOT_AZIMUTHS = np.linspace(-1.0, 1.0, 7)
-"""Candidate places at the robot: shares of the range of the azimuth."""
+"""Azimuths of starting poses at the robot, as multiples of the maximum azimuth."""
 
 
 class NoRoomError(ConfigError):
-    """A clip does not fit on the floor."""
+    """Error for a clip without room on the floor."""
 
     def __init__(self, clip: Clip) -> None:
         """Create an error that names the clip."""
@@ -73,15 +73,18 @@ class Clips:
     """Concatenated pieces of clips."""
 
     frames: Floats
-    """Frames (n_bodies N, 32) of all pieces for each body; they begin at the origin, facing +x."""
+    """Frames (n_bodies N, 32) of all pieces, for one body after the other.
+
+    Each piece begins at the origin, facing +x.
+    """
     row: Ints
-    """First row (n,) of each piece, for the first body."""
+    """Index (n,) of each piece's first row in `frames`, for the first body."""
     count: Ints
-    """Number of rows (n,) of each piece."""
+    """Number (n,) of rows of each piece."""
     fps: Floats
     """Frame rate (n,) of each piece [Hz]."""
     starts: tuple[Floats, ...]
-    """Poses (k, 3) at which there is room for each piece: x, y [m], heading [rad]."""
+    """Poses (k, 3) with room for each piece: x, y [m], heading [rad]."""
 
     @property
     def n_rows(self) -> int:
@@ -95,18 +98,18 @@ class Clips:
 
 
 class _Piece(NamedTuple):
-    """A part of a clip."""
+    """A range of frames of a clip."""
 
     first: int
-    """First frame."""
+    """Index of the first frame."""
     last: int
-    """Last frame."""
+    """Index of the last frame, which belongs to the piece."""
     starts: Floats
-    """Poses (k, 3) as in `Clips.starts`."""
+    """Poses (k, 3) with room for the piece: x, y [m], heading [rad]."""
 
 
 def make_stage(plan: Floorplan, config: MotionConfig) -> Stage:
-    """Return the poses at which workers with these settings begin clips."""
+    """Return the poses at which workers with the given settings begin clips."""
     kinds = {job.at for job in config.jobs} - {"robot"}
     places = [(*p.xy_m, p.yaw_rad) for p in plan.grounds.places if p.kind in kinds]
     low, high = config.near_radius_m
@@ -119,44 +122,54 @@ def make_stage(plan: Floorplan, config: MotionConfig) -> Stage:
 
 
 def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
-    """Cut clips into pieces.
+    """Cut clips into pieces that begin and end with both feet on the floor.
+
+    All bodies have the same pieces, each of which has room on the floor for every body.
 
     Args:
         clips: recorded motion.
-        lengths: dimensions (n_bodies, N_SIZES) of the bodies [m], see `Anatomy.lengths`.
+        lengths: dimensions (n_bodies, N_SIZES) of the bodies [m], as in `Anatomy.lengths`.
         stage: floor and starting poses.
 
     Returns:
-        The pieces, scaled to each body.
+        The n pieces, in the order of the clips, with N frames together. `Clips.frames` holds the
+        N frames of all pieces scaled to the first body, then those scaled to the second body, and
+        so on: piece i of body b begins at row b N + `Clips.row[i]`.
 
     Raises:
-        NoRoomError: no part of a clip fits at any of the starting poses.
-        ConfigError: a clip has no two moments with both feet on the floor.
+        NoRoomError: a clip has no piece that fits at any of the starting poses.
+        ConfigError: a clip does not have two frames with both feet on the floor at least
+            `SHORTEST_S` apart.
     """
-    bodies = [[scale_clip(clip, row) for row in lengths] for clip in clips]
-    cut = [_cut_clip(clip, scaled, stage) for clip, scaled in zip(clips, bodies, strict=True)]
-    pieces = [piece for parts in cut for piece in parts]
-    frames = [np.zeros((0, len(RECORDED)))]
+    scaled_clips = [[scale_clip(clip, size) for size in lengths] for clip in clips]
+    pieces_of_clips = [
+        _cut_clip(clip, scaled, stage) for clip, scaled in zip(clips, scaled_clips, strict=True)
+    ]
+    pieces, fps = list[_Piece](), list[float]()
+    for clip, pieces_of_clip in zip(clips, pieces_of_clips, strict=True):
+        pieces += pieces_of_clip
+        fps += [clip.fps] * len(pieces_of_clip)
+    frames = [np.zeros((0, len(RECORDED)))]  # This entry sets the width if there are no clips.
     for body in range(len(lengths)):
-        for scaled, parts in zip(bodies, cut, strict=True):
-            for first, last, _ in parts:
-                frames.append(move_to_origin(scaled[body][first : last + 1])[:, RECORDED])
-    count = np.array([last - first + 1 for first, last, _ in pieces], np.int64)
-    rates = [clip.fps for clip, parts in zip(clips, cut, strict=True) for _ in parts]
+        for scaled, pieces_of_clip in zip(scaled_clips, pieces_of_clips, strict=True):
+            for piece in pieces_of_clip:
+                controls = move_to_origin(scaled[body][piece.first : piece.last + 1])
+                frames.append(controls[:, RECORDED])
+    count = np.array([piece.last - piece.first + 1 for piece in pieces], np.int64)
     return Clips(
-        np.ascontiguousarray(np.concatenate(frames)),
-        np.cumsum(count) - count,
-        count,
-        np.array(rates),
-        tuple(piece.starts for piece in pieces),
+        frames=np.ascontiguousarray(np.concatenate(frames)),
+        row=np.cumsum(count) - count,
+        count=count,
+        fps=np.array(fps),
+        starts=tuple(piece.starts for piece in pieces),
     )
 
 
 def _cut_clip(clip: Clip, bodies: list[Floats], stage: Stage) -> list[_Piece]:
     """Return the pieces of one clip.
 
-    At both ends of a piece the feet are low. They are also loaded and flat, if the clip has such a
-    frame at about that time.
+    At both ends of a piece, both feet are near the floor. If the clip has such a frame at about the
+    desired time, they are also loaded and flat.
 
     Args:
         clip: recorded motion.
@@ -189,12 +202,12 @@ def _cut_clip(clip: Clip, bodies: list[Floats], stage: Stage) -> list[_Piece]:
 
 
 def _count_edge_frames(n_frames: int, fewest: float) -> float:
-    """Return the number of frames at an end of a piece from which the flattest feet are chosen."""
+    """Return the number of frames at each end of a piece that are searched for flat feet."""
     return min(fewest, EDGE_SHARE * n_frames, max(0.0, 0.5 * (n_frames - fewest)))
 
 
 def _find_stands(clip: Clip) -> Ints:
-    """Return the frames with both feet low; raise `ConfigError` if they do not span a piece."""
+    """Return the frames with both feet near the floor; raise `ConfigError` if there are too few."""
     feet = [find_footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size) for side in range(2)]
     low = (np.stack(feet, 1)[..., 2] - clip.size[ANKLE_Z]).max(1) < LOW_M
     stands = np.flatnonzero(low)
@@ -208,15 +221,15 @@ def _find_stands(clip: Clip) -> Ints:
 
 
 def _count_room(q: Floats, stage: Stage) -> Ints:
-    """Return the number of frames (S,) of control vectors for which each start has room."""
+    """Return the number (S,) of leading frames that have room from each starting pose."""
     way = np.ascontiguousarray(move_to_origin(q)[:, [c.ROOT_X, c.ROOT_Y]])
     return _measure_room(way, stage.starts, stage.plan.grid)
 
 
 def _choose_room(room: Ints, least: int) -> int:
-    """Return the number of frames for which a share `ENOUGH` of the places has room.
+    """Return the number of frames with room at a fraction `ENOUGH` of the starting poses.
 
-    If it is not more than `least`, return the number of frames at the best place.
+    If this number is not above `least`, return that of the best starting pose.
     """
     room = np.sort(room)
     usual = int(room[-max(1, round(ENOUGH * len(room)))])
@@ -225,7 +238,7 @@ def _choose_room(room: Ints, least: int) -> int:
 
 @kernel(makes_arrays=True)
 def _measure_room(way: Floats, starts: Floats, grid: FloorGrid) -> Ints:
-    """Return the number of leading points of a path that have room, for the best of `TURNS_RAD`.
+    """Count the leading points of a path that have room, for the best of `TURNS_RAD`.
 
     Args:
         way: points (N, 2) of the path, which begins at the origin [m].
@@ -256,5 +269,5 @@ def find_piece(clips: Clips, worker: Worker) -> int:
 
 
 def find_next_piece(clips: Clips, worker: Worker) -> int:
-    """Return the index of the next piece after the worker's; the first piece follows the last."""
+    """Return the index of the piece after the worker's piece; the first one follows the last."""
     return (find_piece(clips, worker) + 1) % len(clips.row)

@@ -22,48 +22,48 @@ from hrc_env.motion.posture import MOST_LEAN, find_farthest, locate_ahead, measu
 from hrc_env.motion.state import Worker
 
 TAKE_S = 0.55
-"""Time to take a tool from the belt [s]; judgement."""
+"""Time to take a tool from the belt [s]. The value is an estimate."""
 STEP_S = 0.9
-"""Time to step into a stance [s]; judgement."""
+"""Time to step into a stance [s]. The value is an estimate."""
 KNEEL_S = 1.5
-"""Time to kneel down on one knee [s]; judgement."""
+"""Time to kneel down on one knee [s]. The value is an estimate."""
 CROUCH_S = 1.1
-"""Time to squat down [s]; judgement."""
+"""Time to squat down [s]. The value is an estimate."""
 KNEEL_STEP_AT_S = 0.15
 """Time of the first lift-off in kneeling down [s]."""
 KNEEL_PERIOD_S = 0.62
-"""Period of the steps in kneeling down [s]; the steps are slow to avoid jerks of the knee."""
+"""Period of the steps in kneeling down [s], sufficiently long to avoid jerks of the knee."""
 KNEEL_SWING_S = 0.60
 """Swing time of a foot in kneeling down [s]."""
 CALM_M_S = 1.1
-"""Peak speed of hands on their way to the work [m/s]; typical of calm manual work."""
+"""Peak speed of hands on their way to the work [m/s], typical of calm manual work."""
 KNEE_ASIDE_M = 0.17
 """Lateral offset of a kneeling worker's hands, towards the lowered knee [m]."""
 SPARE_M = 0.03
-"""Reserve in the reach of the arms, because bodies sway [m]."""
+"""Reserve in the reach of the arms for the sway of the body [m]."""
 SLUMP_M = 0.01
 """Forward displacement of the shoulders when standing [m]."""
 TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
-"""Segments from the pelvis to the left shoulder, each the child of the one before."""
+"""Segments from the pelvis to the left shoulder, each of which is a child of the previous one."""
 FAR = 1e3
-"""Time after the end of all steps [s]."""
+"""Value of a time after all steps [s]."""
 
 
 @kernel
 def scale_draw(draw: float, low: float, high: float) -> float:
-    """Return a uniform draw in [0, 1), scaled to [low, high)."""
+    """Scale a random number in [0, 1) to [low, high)."""
     return low + draw * (high - low)
 
 
 @kernel
 def choose_hand(draw: float, worker: Worker) -> int:
-    """Choose the hand for the tool, 0 left or 1 right, by a draw in [0, 1)."""
+    """Choose the hand for the tool, 0 left or 1 right, by a random number in [0, 1)."""
     return 1 if draw < 0.5 + (worker.right_handed - 0.5) * 1.25 else 0
 
 
 @kernel
 def clear_plan(worker: Worker) -> None:
-    """Clear the plan of steps and work; a carried load remains."""
+    """Clear the plan of steps and work, but keep that of a carried load."""
     worker.lean = worker.twist = worker.squat = worker.kneel = worker.crouch = worker.ahead = 0.0
     worker.hold_s = worker.take_s = worker.wander_m = worker.down_m = worker.stroke_m = (
         worker.stroke_hz
@@ -78,14 +78,18 @@ def clear_plan(worker: Worker) -> None:
 
 @kernel
 def begin_plan(draw: float, worker: Worker) -> int:
-    """Clear the plan, and choose the hand for the tool, 0 left or 1 right, by a draw in [0, 1)."""
+    """Clear the plan, and choose the hand for the tool by a random number in [0, 1).
+
+    Returns:
+        The hand: 0 left, 1 right.
+    """
     clear_plan(worker)
     return choose_hand(draw, worker)
 
 
 @kernel
 def plan_kneeling(side: int, worker: Worker) -> None:
-    """Plan to kneel on one knee, 0 left or 1 right."""
+    """Plan to kneel on the knee of a side: 0 left, 1 right."""
     leg = worker.lengths[an.LEG]
     worker.kneel, worker.ahead = 1.0, -0.08
     worker.settle_s, worker.out_at = KNEEL_S, 0.4
@@ -96,16 +100,16 @@ def plan_kneeling(side: int, worker: Worker) -> None:
 
 @kernel
 def offset_before_knee(worker: Worker) -> float:
-    """Return the offset of a kneeling worker's hands to the left [m].
+    """Return the offset of the hands to the left [m].
 
-    They work in front of the lowered knee; the offset is 0 if the worker does not kneel.
+    The hands of a kneeling worker work in front of the lowered knee; otherwise the offset is 0.
     """
     return KNEE_ASIDE_M * (1.0 - 2.0 * worker.step_first) if worker.kneel > 0.0 else 0.0
 
 
 @kernel
 def plan_step_ahead(side: int, ahead: float, worker: Worker) -> None:
-    """Plan to work with one foot, 0 left or 1 right, a distance [m] ahead."""
+    """Plan to work with the foot of a side (0 left, 1 right) set ahead by a distance [m]."""
     step_into(side, ahead, 0.0, 0.02, worker)
     worker.ahead, worker.settle_s = 0.45 * ahead, STEP_S
 
@@ -133,7 +137,11 @@ def plan_stance(z: float, knee: int, foot: int, ahead: float, worker: Worker) ->
 
 @kernel
 def locate_shoulders(worker: Worker) -> Vector3:
-    """Return a standing worker's left shoulder joint: ahead and left of the root, height [m]."""
+    """Return the position of the left shoulder joint of a standing worker.
+
+    Returns:
+        The distances ahead of the root and to the left, and the height [m].
+    """
     bones = worker.bones
     ahead, aside, up = SLUMP_M, 0.0, worker.lengths[an.STAND_Z]
     for segment in TO_SHOULDER:
@@ -148,9 +156,9 @@ def measure_reach(share: float, one: float, other: float, worker: Worker) -> flo
     """Return the reach of an arm along an axis, given the other coordinates of the target [m].
 
     Args:
-        share: share of the arm's length that is used.
-        one: distance of the target along the second axis [m].
-        other: distance of the target along the third axis [m].
+        share: usable fraction of the arm's length.
+        one: coordinate of the target, relative to the shoulder, along a second axis [m].
+        other: coordinate of the target, relative to the shoulder, along the third axis [m].
         worker: record with the body dimensions.
     """
     reach = share * worker.lengths[an.ARM]
@@ -179,7 +187,7 @@ def plan_tool(tool: int, side: int, at: Vector3, turn: Vector3, worker: Worker) 
 
 @kernel
 def plan_other_hand(at: Vector3, worker: Worker) -> None:
-    """Plan the target of the hand without the tool: ahead, to the left, height [m]."""
+    """Plan the target (ahead, to the left, height) of the hand without the tool [m]."""
     other = 1 - worker.side
     target = worker.target[3 * other :]
     target[0], target[1], target[2] = locate_ahead(at.x, at.y, at.z, worker)
@@ -188,7 +196,7 @@ def plan_other_hand(at: Vector3, worker: Worker) -> None:
 
 @kernel
 def plan_gaze(at: Vector3, worker: Worker) -> None:
-    """Plan the point at which the worker looks: ahead, to the left, height [m]."""
+    """Plan the gaze of the worker at a point (ahead, to the left, height) [m]."""
     worker.gaze[0], worker.gaze[1], worker.gaze[2] = locate_ahead(at.x, at.y, at.z, worker)
 
 
@@ -199,7 +207,7 @@ def plan_strokes(
     """Plan bursts of strokes.
 
     Args:
-        kind: kind of stroke, see `strokes`.
+        kind: kind of stroke, one of the constants in `strokes`.
         size_m: size of a stroke [m].
         rate_hz: frequency of the strokes [Hz].
         burst_s: duration of a burst [s].
@@ -212,7 +220,7 @@ def plan_strokes(
 
 @kernel
 def pose_at_work(worker: Worker) -> None:
-    """Write the control vector in the middle of the work, before the first stroke."""
+    """Compute the control vector of the worker at work, before the first stroke."""
     place_feet(FAR, worker)
     stand(worker.start_x, worker.start_y, worker.start_yaw, 0.0, worker)
     extend(1.0, 1.0, worker)
@@ -222,7 +230,7 @@ def pose_at_work(worker: Worker) -> None:
 
 @kernel
 def finish_plan(peak_m_s: float, worker: Worker) -> float:
-    """Complete the plan of work: trunk and durations, given its hands, strokes and steps.
+    """Complete the plan of work, given its hands, strokes and steps, by the lean and the durations.
 
     Plan functions do not call this kernel, because it would then be compiled again in each of them.
 
@@ -248,7 +256,7 @@ def finish_plan(peak_m_s: float, worker: Worker) -> float:
 
 @kernel
 def find_lean(worker: Worker) -> None:
-    """Find the smallest lean that brings the work within reach, or move the work nearer."""
+    """Find the smallest lean with the work within reach; if there is none, move the work nearer."""
     low, high, worker.lean = 0.0, MOST_LEAN, 0.0
     upright = _measure_shortfall(worker)
     if upright <= 0.0:
@@ -287,7 +295,7 @@ def _move_nearer(far: float, worker: Worker) -> None:
 
 @kernel
 def _measure_hand_way(worker: Worker) -> float:
-    """Return the longest distance of a hand from its initial position to its work [m]."""
+    """Return the greater of both hands' distances from initial position to target [m]."""
     pose_at_work(worker)
     used, goal = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1]), worker.goals
     for i in range(6):

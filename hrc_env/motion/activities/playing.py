@@ -1,6 +1,6 @@
-"""Playing a clip: two steps into its first pose, the recording, and two steps to a stance.
+"""Playing of a clip, with two steps to its first pose and two steps to a stance after it.
 
-A frame holds the columns `clip.RECORDED` of a piece (`pieces.Clips`).
+A frame contains the columns `clip.RECORDED` of the control vector (see `pieces.Clips`).
 """
 
 import math
@@ -27,15 +27,15 @@ PERIOD_S = 0.50
 SWING_S = 0.42
 """Swing time of the steps before and after a clip [s]."""
 TILT_S = 0.25
-"""Time in which standing feet reach their pitch in the clip [s]."""
+"""Time in which the standing feet change to their pitch in the clip [s]."""
 PACE_S = 0.6
 """Time in which the recording accelerates to its normal rate, and decelerates from it [s]."""
 SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
 """Total time of the two steps and the change of pitch [s]."""
 END, BEGIN, LAST = 0, 2, 4
-"""First of two footprints at the activity's end, the clip's beginning, and the clip's end."""
+"""Index of the first of two footprints at the activity's end, the clip's beginning and its end."""
 STRIDE_SHARE = 0.25
-"""Length of the steps before and after a clip as a share of a full stride."""
+"""Length of the steps before and after a clip, as a fraction of a full stride."""
 
 
 def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> float:
@@ -81,14 +81,14 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
 
 @kernel
 def _to_clip_time(since: float, worker: Worker) -> float:
-    """Convert the time [s] since playback began to the time in the recording [s]."""
+    """Convert the time since playback began [s] to the time in the recording [s]."""
     slow = worker.clip_s - PACE_S
     return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 
 
 @kernel
 def play(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
-    """Write the control vector of playing a clip, including the feet.
+    """Compute the control vector of playing a clip, including the feet.
 
     Args:
         t: time since the activity began [s].
@@ -143,7 +143,7 @@ def _interpolate_frames(f: float, column: int, frames: Floats, worker: Worker) -
 
 @kernel
 def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
-    """Blend root, trunk, head and arms of a standing worker with those of the clip.
+    """Blend the poses of root, trunk, head and arms of a standing worker with those of the clip.
 
     Args:
         f: time in frames of the clip.
@@ -167,7 +167,7 @@ def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
-    """Write the pose of a foot in the clip, transformed to the world.
+    """Compute the pose of a foot in the clip, transformed to the world frame.
 
     Args:
         f: time in frames of the clip.
@@ -188,7 +188,7 @@ def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def predict_clip_root(t: float, worker: Worker) -> Point:
-    """Predict the approximate root on the floor at time t of a clip, also after its end."""
+    """Predict the approximate position of the root at time t of a clip, also after its end."""
     duration_s = worker.clip_s + 2.0 * SETTLE_S
     u = min(max(t / duration_s, 0.0), 1.0) * (N_ROOTS - 1)
     k = min(int(u), N_ROOTS - 2)

@@ -1,4 +1,4 @@
-"""Running: short contacts with flights between, bent arms, and a lean that follows acceleration.
+"""Running, with flights between short contacts, bent arms, and a lean due to acceleration.
 
 Steps are planned by `walk.plan_steps`, with a longer swing. At 2.5 to 3.5 m/s, the cadence is about
 165 to 175 steps/min and the contact time 0.25 s (Cavanagh & Kram 1989,
@@ -20,22 +20,28 @@ STEP_S = 0.355
 STEP_FASTER_S = 0.03
 """Decrease of the period for each m/s above `USUAL_M_S` [s]."""
 USUAL_M_S = 3.0
-"""Speed at which `STEP_S` and `ALOFT_SHARE` hold [m/s]."""
+"""Speed for which `STEP_S` and `ALOFT_SHARE` hold [m/s]."""
 ALOFT_SHARE = 1.46
 """Swing time at `USUAL_M_S`, in periods of a step.
 
-It is about 0.06 s more than the time between two contacts, because a foot lifts off slowly.
+It exceeds the time between two contacts by about 0.06 s because a foot lifts off slowly.
 """
 ALOFT_FAST = 0.08
 """Increase of `ALOFT_SHARE` for each m/s above `USUAL_M_S`."""
 RUN_M_S2 = 3.0
-"""Mean acceleration at the beginning, and deceleration at the end [m/s^2]; judgement."""
+"""Mean acceleration at the beginning and mean deceleration at the end [m/s^2].
+
+The value is an estimate.
+"""
 CORNER_M_S2 = 2.5
-"""Greatest lateral acceleration in corners [m/s^2]; judgement."""
+"""Maximum lateral acceleration in corners [m/s^2]. The value is an estimate."""
 BRAKED_M = 0.3
-"""Path length in addition to that for acceleration and deceleration [m]; judgement."""
+"""Length of a path in excess of that for acceleration and deceleration [m].
+
+The value is an estimate.
+"""
 BOB_M = 0.036
-"""Amplitude of the pelvis's vertical motion [m]; measured: 7 to 9 cm peak to peak."""
+"""Amplitude of the pelvis's vertical motion [m]; measured values are 7 to 9 cm peak to peak."""
 LOWER_M = 0.085
 """Lowering of the pelvis from its standing height [m]."""
 LEAN_RAD = 0.12
@@ -47,14 +53,14 @@ ARM_RAD = 0.52
 ELBOW_RAD = 1.45
 """Bend of the elbow [rad]."""
 ELBOW_SWING = 0.35
-"""Additional bend of the elbow as a share of the arm swing."""
+"""Additional bend of the elbow, as a fraction of the arm swing."""
 NECK = 0.7
-"""Share of the lean that the neck compensates."""
+"""Fraction of the trunk's lean that the neck compensates."""
 
 
 @kernel
 def limit_run_speed(wanted_m_s: float, worker: Worker) -> float:
-    """Return the desired speed, limited by length and curvature of the worker's path [m/s]."""
+    """Return the desired speed [m/s], limited by the length and curvature of the worker's path."""
     straight = math.sqrt(RUN_M_S2 * max(worker.length - BRAKED_M, 0.0))
     return min(wanted_m_s, straight, math.sqrt(CORNER_M_S2 / max(worker.sharpest, 1e-6)))
 
@@ -83,7 +89,7 @@ def plan_run(end_yaw: float, speed_m_s: float, worker: Worker) -> float:
 
 @kernel
 def run(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector of a runner, except for the feet.
+    """Compute the control vector of a runner, except for the feet.
 
     Args:
         t: time since the run began [s].

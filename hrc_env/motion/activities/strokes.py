@@ -1,4 +1,4 @@
-"""Movements of hands and tools at work: bursts of strokes, and moves along the work."""
+"""Movements of hands and tools at work: bursts of strokes and displacements between them."""
 
 import math
 from typing import NamedTuple
@@ -12,13 +12,13 @@ from hrc_env.motion.state import Worker
 STILL, STRIKE, BORE, PRESS, SAW, SHIFT, BUSY, JAB = range(8)
 """Kinds of strokes.
 
-They are: none; blows of a hammer; drilling while the other hand fetches screws; drilling; sawing;
-only moving along the work; small movements of both hands; beats of a pointing hand.
+They are: no strokes; blows of a hammer; drilling while the other hand fetches screws; drilling;
+sawing; displacements along the work only; small movements of both hands; beats of a pointing hand.
 """
 PAUSE_S = 0.7
 """Time between two bursts [s]."""
 EASE_S = 0.25
-"""Time in which strokes fade in and out [s]."""
+"""Time in which the amplitude of strokes rises, and equally decreases [s]."""
 FETCH_S = 0.55
 """Time in which the hand moves from the work to the pouch [s]."""
 
@@ -34,7 +34,7 @@ class ScrewProgress(NamedTuple):
 
 @kernel
 def apply_stroke(t: float, worker: Worker) -> None:
-    """Add the stroke to the tool's pose in `q`, and write the other hand's offset from its target.
+    """Add the stroke to the pose of the tool, and compute the other hand's offset from its target.
 
     Args:
         t: time since the hands arrived at the work [s], from 0 to `hold_s`.
@@ -68,7 +68,7 @@ def apply_stroke(t: float, worker: Worker) -> None:
 
 @kernel
 def _wander(n: int, u: float, other: int, worker: Worker) -> None:
-    """Move back and forth along the work, or down, by one position per burst.
+    """Move tool and hands along the work or down, by one position per burst.
 
     Args:
         n: index of the burst.
@@ -117,7 +117,7 @@ def _advance_tool(way: float, worker: Worker) -> None:
 
 @kernel
 def _strike(ease: float, turn: float, worker: Worker) -> None:
-    """Swing the hammer slowly back and faster forward, by wrist and arm.
+    """Swing the hammer with wrist and arm, slowly back and faster forward.
 
     Args:
         ease: weight of the stroke.
@@ -136,7 +136,7 @@ def _strike(ease: float, turn: float, worker: Worker) -> None:
 
 @kernel
 def _fetch(u: float, other: int, worker: Worker) -> None:
-    """Move the other hand to the belt for the next screw, and back.
+    """Move the other hand to the pouch on the belt for the next screw, and back.
 
     Args:
         u: time since the burst began [s].

@@ -1,4 +1,4 @@
-"""Work in place: lower the body, take a tool from the belt, work, and do the same in reverse."""
+"""Work in place: lower the body, take a tool from the belt, work, and reverse these movements."""
 
 import math
 
@@ -13,49 +13,64 @@ from hrc_env.motion.posture import lean, locate_from_root, look_at
 from hrc_env.motion.state import Worker
 
 _X, _Y, _STRIDE_SHARE = 0, 1, 3
-"""Columns of a footprint: world x and y [m], and share of a full stride."""
+"""Columns of a footprint: world x and y [m], and step length as a fraction of a full stride."""
 _SHORT_STEP_SHARE = 0.3
-"""Share of a full stride of the steps that widen a stance; judgement."""
+"""Length of the steps that widen a stance, as a fraction of a full stride.
+
+The value is an estimate.
+"""
 GAZE_LEAD_S = 0.25
-"""Lead of eyes and head over the hand [s] (Land & Hayhoe 2001: up to half a second)."""
+"""Time by which eyes and head lead the hand [s] (Land & Hayhoe 2001: up to half a second)."""
 BELT_AHEAD_M = 0.10
-"""Distance of a tool on the belt ahead of the pelvis [m]; judgement."""
+"""Distance of a tool on the belt ahead of the pelvis [m]. The value is an estimate."""
 BELT_SIDE_M = 0.29
-"""Lateral distance of a tool on the belt from the pelvis [m]; judgement."""
+"""Lateral distance of a tool on the belt from the pelvis [m]. The value is an estimate."""
 BELT_UP_M = 0.06
-"""Height of a tool on the belt above the pelvis [m]; judgement."""
+"""Height of a tool on the belt above the pelvis [m]. The value is an estimate."""
 BELT_PITCH_RAD = 1.3
-"""Pitch of a tool on the belt [rad]; judgement."""
+"""Pitch of a tool on the belt [rad]. The value is an estimate."""
 BELLY_AHEAD_M = 0.34
-"""Distance ahead of the pelvis at which the other hand passes on the way to the floor [m]."""
+"""Distance from the pelvis at which the hand without a tool passes ahead of it [m].
+
+The hand passes the body on its way to the floor.
+"""
 BELLY_SIDE_M = 0.06
-"""Lateral distance from the pelvis at which the other hand passes on the way to the floor [m]."""
+"""Lateral distance from the pelvis at which the hand without a tool passes it [m]."""
 BELLY_UP_M = 0.22
-"""Height above the pelvis at which the other hand passes on the way to the floor [m]."""
+"""Height above the pelvis at which the hand without a tool passes it [m]."""
 EARLY_SHARE = 0.55
-"""Share of the time to lower the body after which the hands have arrived; judgement."""
+"""Time at which the hands arrive, as a fraction of the time to lower the body.
+
+The value is an estimate.
+"""
 JOIN_AT = 0.3
-"""Share of the way at which a second hand joins a tool; judgement."""
+"""Fraction of the path to the work at which the second hand joins a tool.
+
+The value is an estimate.
+"""
 DRAWN_SHARE = 0.6
-"""Share of the time to reach out after which a two-handed tape is drawn; judgement."""
+"""Time at which a tape held in both hands is pulled out, as a fraction of the time to reach out.
+
+The value is an estimate.
+"""
 ELBOWS_RAD = 0.25
-"""Outward turn of the elbows at work [rad]; judgement."""
+"""Outward turn of the elbows at work [rad]. The value is an estimate."""
 LOW_ELBOWS_RAD = 0.4
-"""Outward turn of the elbows at floor height [rad]; judgement."""
+"""Outward turn of the elbows at floor height [rad]. The value is an estimate."""
 RISE = 0.5
-"""Forward bulge of a hand's path to high work, as a share of the work's height."""
+"""Forward bulge of a hand's path to high work, divided by the height of the work."""
 OVER_KNEE_M = 0.22
 """Bulge of a hand's path over the knees to low work [m]."""
 LOW_M = 0.6
-"""Height below which work counts as low [m]."""
+"""Height below which work is considered low [m]."""
 KNEE_M = 0.055
 """Height of the knee joint in kneeling [m]."""
 HAUNCH_SHARE = 0.46
-"""Height of the pelvis in a full squat as a share of its height when standing."""
+"""Height of the pelvis in a full squat, as a fraction of its height in standing."""
 KNEEL_HEEL_RAD = 1.2
-"""Pitch of the rear foot in kneeling, with the heel up [rad]; judgement."""
+"""Pitch of the rear foot in kneeling, with the heel up [rad]. The value is an estimate."""
 HAUNCH_HEEL_RAD = 0.55
-"""Pitch of both feet in a full squat, with the heels up [rad]; judgement."""
+"""Pitch of both feet in a full squat, with the heels up [rad]. The value is an estimate."""
 FRONT_LEG = 0.38
 """Forward step of a kneeling worker's front foot from its stance, in leg lengths."""
 REAR_LEG = -0.72
@@ -70,7 +85,7 @@ STEP_SWING_S = 0.38
 
 @kernel
 def get_down(down: float, worker: Worker) -> None:
-    """Lower a standing body by a share and raise its heels; its steps are planned elsewhere."""
+    """Lower a standing body to a degree from 0 to 1, and raise its heels."""
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], worker.ahead * down, 0.0)
     kneel, crouch = worker.kneel * down, worker.crouch * down
@@ -125,8 +140,8 @@ def extend(down: float, out: float, worker: Worker) -> None:
     """Lower a standing body, and move the tool from the belt to the work.
 
     Args:
-        down: share by which the body is lowered.
-        out: share by which the hands have reached out.
+        down: degree to which the body is lowered, from 0 to 1.
+        out: degree to which the hands have reached out, from 0 to 1.
         worker: record with the plan; its `q` is changed.
     """
     q, at = worker.q, c.PROP_POSE
@@ -149,7 +164,7 @@ def _bulge_way(at: int, goal_z: float, out: float, worker: Worker) -> None:
     Args:
         at: column of the point's x.
         goal_z: height of the point's goal [m].
-        out: share of the path that has been covered.
+        out: completed fraction of the path.
         worker: record of the worker; its `q` is changed.
     """
     q = worker.q
@@ -164,9 +179,9 @@ def place_hands(out: float, taken: float, early: float, worker: Worker) -> None:
     """Set the targets of the hand with the tool and of the other hand.
 
     Args:
-        out: share of the way from the belt that the tool has covered.
-        taken: share by which the hand follows the tool.
-        early: share by which the hands have followed their targets while the body is lowered.
+        out: completed fraction of the path of the tool from the belt to the work.
+        taken: weight with which the hand follows the tool, from 0 to 1.
+        early: weight of the hands' targets while the body is lowered, from 0 to 1.
         worker: record with the plan; its `q` is changed.
     """
     q, side, tool = worker.q, worker.side, worker.tool
@@ -205,7 +220,7 @@ def _pass_belly(hand: int, at: int, share: float, worker: Worker) -> None:
     Args:
         hand: 0 left, 1 right.
         at: column of the target's x.
-        share: share of the move.
+        share: fraction of the full movement.
         worker: record of the worker; its `q` is changed.
     """
     q, goal = worker.q, worker.target[3 * hand : 3 * hand + 3]

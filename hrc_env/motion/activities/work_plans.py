@@ -1,7 +1,7 @@
-"""Plans of work in place: with tools, pointing, lunges, and low work with both hands.
+"""Plans of work in place with tools, of pointing, of lunges, and of low work with both hands.
 
-`plan_...` returns the peak speed of the hands on their way to the work [m/s], an argument of
-`planning.finish_plan`.
+The functions `plan_...` return the peak speed of the hands on their way to the work [m/s], which
+is an argument of `planning.finish_plan`.
 """
 
 import math
@@ -22,33 +22,36 @@ DRILL = PROP_NAMES.index("drill")
 HAND_SAW = PROP_NAMES.index("saw")
 TAPE = PROP_NAMES.index("tape_measure")
 _SCREW_STEP_M = 0.12
-"""Forward step of the foot opposite to the drill when driving screws [m]; judgement."""
+"""Forward step of the foot opposite to the drill when driving screws [m].
+
+The value is an estimate.
+"""
 _SCREW_S = (1.0, 1.3)
-"""Range of the time to drive one screw [s]; judgement."""
+"""Time to drive one screw [s]. The values are estimates."""
 _GAZE_M = 0.18
-"""Distance of the gaze point ahead of the fist, and to its right, when driving screws [m]."""
+"""Distances of the gaze point ahead of the fist and to its right when driving screws [m]."""
 _GAZE_DOWN_M = 0.2
 """Distance of the gaze point below the first screw when driving screws [m]."""
 LEVEL = Vector3(0.0, 0.0, 0.0)
 """Orientation of a tool that points straight ahead: yaw, pitch, roll [rad]."""
 HEAD_M = 0.25
-"""Distance from the fist to the hammer's head along the handle [m], see `props`."""
+"""Distance from the fist to the hammer's head along the handle [m], as in `props`."""
 FACE_M = 0.05
-"""Distance from the handle to the hammer's striking face [m], see `props`."""
+"""Distance from the handle to the hammer's striking face [m], as in `props`."""
 LIGHT_HZ = 5.6
-"""Frequency of light taps [Hz]; their speed is at most 1.1 m/s; judgement."""
+"""Frequency of light taps [Hz]. The value is an estimate; the speed is at most 1.1 m/s."""
 LIGHT_M = 0.060
-"""Peak-to-peak size of light taps [m]; judgement."""
+"""Peak-to-peak amplitude of light taps [m]. The value is an estimate."""
 LOW_SHARE = 0.7
-"""Size of low blows relative to other blows; judgement."""
+"""Size of low blows relative to other blows. The value is an estimate."""
 WALL_M = 1.2
-"""Height above which nails are driven into a wall instead of downwards [m]."""
+"""Height above which nails are driven horizontally into a wall instead of downwards [m]."""
 OVERHEAD_M = 1.7
 """Height above which work is overhead [m]."""
 BIT_M = 0.22
-"""Distance of the drill bit's tip ahead of the fist [m], see `props`."""
+"""Distance of the drill bit's tip ahead of the fist [m], as in `props`."""
 BIT_UP_M = 0.09
-"""Height of the drill bit's tip above the fist [m], see `props`."""
+"""Height of the drill bit's tip above the fist [m], as in `props`."""
 THRUST_M = 0.04
 """Depth of a hole, and length of a screw [m]."""
 SCREWS = 4
@@ -62,17 +65,20 @@ FIST_LEFT_M = 0.127
 ASKEW_RAD = -0.25 * math.pi
 """Yaw of the drill from the heading when driving screws into the robot's workpiece [rad]."""
 CUT_RAD = 0.6
-"""Pitch of the saw blade [rad]; 45 to 60 degrees to the board are usual; judgement."""
+"""Pitch of the saw blade [rad]; angles of 45 to 60 degrees to the board are usual.
+
+The value is an estimate.
+"""
 SHOULDER_SHARE = 1.50
-"""Height of the shoulder as a multiple of pelvis height."""
+"""Height of the shoulder, as a multiple of pelvis height."""
 SHOULDER_M = 0.19
 """Lateral distance of the shoulder from the body's midline [m]."""
 POINT_M_S = 1.5
-"""Peak speed of a pointing hand [m/s]; judgement."""
+"""Peak speed of a pointing hand [m/s]. The value is an estimate."""
 NEAREST_ARMS = 1.2
-"""Least distance of the target of a lunge, in arm lengths; judgement."""
+"""Minimum distance of the target of a lunge, in arm lengths. The value is an estimate."""
 FARTHEST_ARMS = 1.5
-"""Greatest distance of the target of a lunge, in arm lengths; judgement."""
+"""Maximum distance of the target of a lunge, in arm lengths. The value is an estimate."""
 
 
 @kernel
@@ -80,8 +86,8 @@ def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to drive nails with a hammer.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -118,8 +124,8 @@ def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to drill holes, at a wall or overhead.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -154,7 +160,8 @@ def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
     Positions are relative to the initial position and heading: ahead, left, height [m].
 
     Args:
-        draws: (N_START,) uniform draws in [0, 1): 0 the hand, 2 the time for a screw.
+        draws: uniform random numbers (N_START,) in [0, 1); 0 selects the hand, 2 the time for a
+            screw.
         height: height of the first screw [m].
         worker: record into which the plan is written.
 
@@ -187,8 +194,8 @@ def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to saw a board.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -214,8 +221,8 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to measure with a tape measure.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -235,11 +242,11 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_point(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to point in a random direction ahead; the height has no effect.
+    """Plan to point in a random direction ahead.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m].
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: unused; part of the interface of plan functions.
         worker: record into which the plan is written.
 
     Returns:
@@ -268,8 +275,8 @@ def plan_lunge(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to lunge at a point ahead with one hand.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -295,8 +302,8 @@ def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to kneel and work near the floor.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -312,8 +319,8 @@ def plan_squat(draws: Floats, height: float, worker: Worker) -> float:
     """Plan to squat and work near the floor.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:
@@ -330,8 +337,8 @@ def _plan_hands_low(ahead: float, draws: Floats, height: float, worker: Worker) 
 
     Args:
         ahead: distance of the work ahead of the feet [m].
-        draws: uniform draws (N_START,) in [0, 1).
-        height: height of the work [m]; 0 to draw one.
+        draws: uniform random numbers (N_START,) in [0, 1).
+        height: height of the work [m]; 0 for a random height.
         worker: record into which the plan is written.
 
     Returns:

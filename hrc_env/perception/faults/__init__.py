@@ -1,1 +1,1 @@
-"""Configurable faults of cameras, drawn from a separate random generator."""
+"""Configurable faults of cameras, sampled with a separate random generator."""

@@ -1,4 +1,4 @@
-"""Images of cameras with faults, rendered when windows of them are requested."""
+"""Images of cameras with faults, in which requested windows are rendered."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ class ScenePose:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """The scene at a step, which an image may show at a later step."""
+    """The scene at a step, which may be shown by an image that arrives at a later step."""
 
     step: int
     """Number of the step."""
@@ -46,7 +46,7 @@ class Shot:
 
 
 class CameraFilm:
-    """An `ImageSource` of the cameras' present images, which are black for cameras without one.
+    """An `ImageSource` of the cameras' present images; cameras without an image are black.
 
     Args:
         viewer: renderer of images with lens distortion.
@@ -56,7 +56,7 @@ class CameraFilm:
     def __init__(self, viewer: LensRenderer, schedule: Schedule) -> None:
         self.renderer, self.viewer, self.schedule = viewer.renderer, viewer, schedule
         self._now = schedule
-        """Schedule of the present episode."""
+        """Schedule of the cameras' images and faults in the present episode."""
         self._shots: Sequence[Shot | None] = ()
         self._seed = 0
         self._drawn: Any = None
@@ -68,7 +68,7 @@ class CameraFilm:
         self._shots, self._seed, self._drawn = tuple(shots), seed, None
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Render a window of a camera's image, upright, (size, size, 3) RGB."""
+        """Render an upright window (size, size, 3) of a camera's RGB image."""
         shot = self._shots[camera_index]
         if shot is None:
             return np.zeros((self.renderer.size_px, self.renderer.size_px, 3), np.uint8)
@@ -100,7 +100,7 @@ class CameraFilm:
 
 
 def _pose_before(shot: Shot, share: float) -> ScenePose:
-    """Interpolate the pose of the scene at a fraction `share` of a step before a shot."""
+    """Interpolate the pose of the scene at the fraction `share` of a step before a shot."""
     if share == 0.0:
         return shot.pose
     motion, last = shot.pose.motion, shot.before.motion
@@ -114,14 +114,14 @@ def _pose_before(shot: Shot, share: float) -> ScenePose:
 
 
 def _interpolate(now: MovingT, before: MovingT, share: float) -> MovingT:
-    """Interpolate the poses of bodies or props from `now` (share 0) to `before` (share 1)."""
+    """Interpolate poses of bodies or objects between `now` (`share` 0) and `before` (`share` 1)."""
     places = _mix(now.position_world, before.position_world, share)
     turns = _mix_quaternions(now.quaternion_wxyz, before.quaternion_wxyz, share)
     return replace(now, position_world=places, quaternion_wxyz=turns)
 
 
 def _mix(now: Floats, before: Floats, share: float) -> Floats:
-    """Interpolate numbers linearly from `now` (share 0) to `before` (share 1)."""
+    """Interpolate numbers linearly between `now` (`share` 0) and `before` (`share` 1)."""
     return now + share * (before - now)
 
 

@@ -1,4 +1,4 @@
-"""Effects of camera faults on images."""
+"""Simulation of the effects of camera faults on images."""
 
 import math
 from collections.abc import Callable
@@ -16,45 +16,47 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.perception.faults.schedule import draws
 
 GAMMA = 2.2
-"""Gamma of the images: the amount of light is the pixel value to this power."""
+"""Exponent of the images' gamma: the amount of light is the pixel value raised to this power."""
 DIRT_RGB = (72, 64, 54)
-"""Colour of dirt."""
+"""Colour of dirt on the lens, in RGB."""
 N_SPOTS = 14
 """Number of spots on a dirty lens."""
 COVER = 0.9
-"""Share of the light that the centre of a spot blocks."""
+"""Fraction of the light that is blocked by the centre of a spot."""
 RIM = 1.25
-"""Outer radius of a spot, in units of its nominal radius; the blur at its edge has a width of half
-a nominal radius."""
+"""Outer radius of a spot, in units of its nominal radius. The width of the blur at its edge is half
+of the nominal radius."""
 GLARE_REACH = 0.25
-"""Radius of the haze around a light that shines into the lens, as a share of the image's width."""
+"""Radius of the haze around a light that shines into the lens, as a fraction of the image's
+width."""
 GLARE_VEIL = 0.35
-"""Uniform haze of the whole image, as a share of the haze at the light."""
+"""Uniform haze in the whole image, as a fraction of the haze at the light."""
 DARK_NOISE = 5.0
-"""Standard deviation of the noise of an image with 1/20 of the light [grey levels]; an assumption
-about low-cost sensors."""
+"""Standard deviation of the noise in an image with 1/20 of the normal light [grey levels]. The
+value is an assumption about low-cost sensors."""
 
 
 class CropView(NamedTuple):
     """A crop of an image to which a fault is applied."""
 
     crop: Image
-    """(n, n, 3) RGB, which is not changed."""
+    """(n, n, 3) RGB crop, which is not changed."""
     camera: PinholeCamera
     """Camera of the image."""
     window: Roi
     """Window of the image that the crop shows [px]."""
     seeds: tuple[int, ...]
-    """Seed of the episode's faults, and the numbers of the fault, the camera and the step."""
+    """Seeds of the fault's random numbers: seed of the episode's faults, and numbers of the fault,
+    the camera and the step."""
 
 
 def darkness_noise(share: float) -> float:
-    """Return the standard deviation of the noise at a share of the light [grey levels]."""
+    """Return the standard deviation of the noise [grey levels] at a fraction of normal light."""
     return DARK_NOISE * math.sqrt(max(1.0 - share, 0.0) / 0.95)
 
 
 def corrupt(view: CropView, fault: FaultConfig) -> Image:
-    """Apply a fault of the group `IMAGE` to a crop; `CameraFilm` applies motion blur."""
+    """Apply a fault of the group `IMAGE`, except motion blur (see `CameraFilm`), to a crop."""
     return _CORRUPT[fault.kind](view, fault.max_amount)
 
 
@@ -68,9 +70,10 @@ def _defocus(view: CropView, radius_px: float) -> Image:
 
 
 def _add_noise(view: CropView, levels: float) -> Image:
-    """Add independent noise of each camera pixel to a crop [grey levels].
+    """Add noise to a crop that is independent for each camera pixel [grey levels].
 
-    If the crop has a higher resolution than the image, the noise is enlarged accordingly.
+    If the resolution of the crop is higher than that of the image, the noise is enlarged with the
+    image.
     """
     crop = view.crop
     n = min(max(round(view.window.side_px), 8), len(crop))
@@ -81,7 +84,7 @@ def _add_noise(view: CropView, levels: float) -> Image:
 
 
 def _add_dirt(view: CropView, share: float) -> Image:
-    """Add spots to a crop that hide a share of the image and are constant over an episode.
+    """Add spots to a crop that hide a fraction of the image and are constant over an episode.
 
     The spots are blurred, because dirt on the lens is out of focus.
     """
@@ -100,7 +103,7 @@ def _add_dirt(view: CropView, share: float) -> Image:
 
 
 def _tint(view: CropView, share: float) -> Image:
-    """Increase the red and reduce the blue values of a crop by a share."""
+    """Increase the red and reduce the blue values of a crop by a fraction of them."""
     return _image(view.crop * np.array([1.0 + share, 1.0, 1.0 - share]))
 
 
@@ -111,7 +114,7 @@ def _expose(view: CropView, stops: float) -> Image:
 
 
 def _darken(view: CropView, share: float) -> Image:
-    """Reduce the light of a crop to a share, and add the corresponding noise."""
+    """Reduce the light of a crop to a fraction, and add the corresponding noise."""
     return _add_noise(view._replace(crop=_expose(view, math.log2(share))), darkness_noise(share))
 
 

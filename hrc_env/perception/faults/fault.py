@@ -17,21 +17,21 @@ from hrc_env.core.mapping import answer_unknown_fields
 FOREVER_S = 1e9
 """End time of a permanent fault [s]."""
 TIMING, PLACE, IMAGE = "timing", "place", "image"
-"""Groups of faults: of the timing of images, of the pose and intrinsics of a camera, and of the
+"""Groups of faults, which affect the timing of images, the pose and intrinsics of a camera, or the
 appearance of images."""
 
 
 class Kind(NamedTuple):
-    """A kind of fault."""
+    """Description of a kind of fault."""
 
     group: str
-    """Group of the kind: `TIMING`, `PLACE` or `IMAGE`."""
+    """Group of the fault: `TIMING`, `PLACE` or `IMAGE`."""
     unit: str
     """Unit of the fault's amount."""
     usual: float
-    """Default amount [unit], which is clearly visible but realistic."""
+    """Default amount in units of `unit`, with a clearly visible but realistic effect."""
     bounds: tuple[float, float]
-    """Minimum and maximum amount [unit]."""
+    """Minimum and maximum amount, in units of `unit`."""
     description: str
     """Phrase that describes the fault."""
 
@@ -87,7 +87,7 @@ KINDS: dict[str, Kind] = {
 }
 """All kinds of faults, by name."""
 ALL = "all"
-"""Value that stands for all cameras, instead of a camera's name."""
+"""Value of `FaultConfig.cameras` that selects all cameras."""
 
 
 @answer_unknown_fields
@@ -107,12 +107,12 @@ class FaultConfig:
     """Cameras with the fault, by name or by index (from 0) in the rig; ("all",) means every
     camera."""
     amount: float | tuple[float, float] | None = None
-    """Amount of the fault in the kind's unit. For a pair (minimum, maximum), each episode's amount
-    is drawn uniformly from this range; None is the kind's default."""
+    """Amount of the fault in the kind's unit. If it is a pair (minimum, maximum), the amount in
+    each episode is sampled uniformly from this range. None selects the default of the kind."""
     start_s: float = 0.0
-    """Time in the episode at which the fault begins [s]; 0 is the reset."""
+    """Time since the reset at which the fault begins [s]."""
     end_s: float = FOREVER_S
-    """Time in the episode at which the fault ends [s]."""
+    """Time since the reset at which the fault ends [s]."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -150,29 +150,29 @@ class FaultConfig:
 
     @property
     def max_amount(self) -> float:
-        """Amount in the kind's unit; the maximum if it is a range."""
+        """Amount in the unit of the kind, or its maximum if it is a range."""
         if isinstance(self.amount, tuple):
             return self.amount[1]
         return KINDS[self.kind].usual if self.amount is None else self.amount
 
     @property
     def is_range(self) -> bool:
-        """Whether each episode's amount is drawn from a range."""
+        """Whether the amount is a range from which each episode's amount is sampled."""
         return isinstance(self.amount, tuple)
 
     def draw(self, rng: np.random.Generator) -> "FaultConfig":
-        """Return the fault of an episode, with an amount drawn from the range."""
+        """Return the fault of an episode, with an amount sampled from the range."""
         if not isinstance(self.amount, tuple):
             return self
         return replace(self, amount=float(rng.uniform(*self.amount)))
 
     def is_active(self, time_s: float) -> bool:
-        """Return whether the fault is active at a time in the episode, to within 0.5 ms."""
+        """Return whether the fault is active at a time since the reset, to within 0.5 ms."""
         return self.start_s - 5e-4 <= time_s < self.end_s - 5e-4
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
-    """Raise `ConfigError` if a fault refers to a camera that is not in the rig with these names."""
+    """Raise `ConfigError` if a fault refers to a camera that is not in the rig."""
     for fault in faults:
         for camera in fault.cameras:
             if not isinstance(camera, str):

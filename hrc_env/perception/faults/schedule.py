@@ -19,25 +19,26 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.faults.fault import ALL, KINDS, PLACE, TIMING, FaultConfig, check_cameras
 
 _AMOUNT = 0xA303
-"""Number in place of the camera's index in the seed of a fault's amount, larger than any index."""
+"""Number that replaces the camera's index in the seed of a fault's amount. It is larger than any
+index."""
 _EARLY = 1e-6
-"""Tolerance of times for rounding errors, as a share of a step."""
+"""Tolerance for rounding errors of times, as a fraction of a step."""
 
 
 class Frame(NamedTuple):
     """An image that has arrived."""
 
     scene_step: int
-    """Step of the scene that the image shows."""
+    """Step at which the scene had the state that the image shows."""
     taken_step: int
-    """Step of the image's timestamp."""
+    """Step that corresponds to the image's timestamp."""
 
 
 class NumberedFault(NamedTuple):
-    """A fault with its number in the schedule, which seeds its random numbers."""
+    """A fault and its index in the schedule, which is part of the seed of its random numbers."""
 
     number: int
-    """Index in the schedule."""
+    """Index of the fault in the schedule."""
     fault: FaultConfig
     """The fault."""
 
@@ -46,14 +47,15 @@ class Arrivals(NamedTuple):
     """The images that arrive at a step."""
 
     records: list[Any]
-    """(C,) record of the step that each camera's image shows; None without an image."""
+    """(C,) record of the step that is shown by each camera's image; None without an image."""
     times_s: Floats
-    """(C,) timestamps of the images, where the reset is at `dt_s`; NaN without an image [s]."""
+    """(C,) timestamps of the images, in a clock that reads `dt_s` at the reset [s]; NaN without an
+    image."""
 
 
 @dataclass(frozen=True, slots=True)
 class Schedule:
-    """The timing of the cameras' images over an episode, and the cameras' faults."""
+    """Schedule of the cameras' images and faults over an episode."""
 
     cameras: tuple[CameraConfig, ...]
     """Cameras of the rig, with their calibrated poses."""
@@ -67,7 +69,7 @@ class Schedule:
 
     @property
     def is_plain(self) -> bool:
-        """Whether every camera delivers a faultless image without delay at every step."""
+        """Whether all cameras deliver an image without faults and delay at every step."""
         return not self.faults and not any(
             camera.rate_hz or camera.latency_s or camera.exposure_s for camera in self.cameras
         )
@@ -85,18 +87,18 @@ class Schedule:
 
     @property
     def frozen_steps(self) -> frozenset[int]:
-        """Steps of the scenes that frozen images show."""
+        """Steps of the scene that are shown by frozen images."""
         return frozenset(self._frozen_at(f) for f in self.faults if f.kind == "frozen")
 
     def draw_episode(self, seed: int) -> "Schedule":
-        """Return the schedule of an episode, with an amount drawn for every fault."""
+        """Return the schedule of an episode, with a sampled amount of every fault."""
         if not any(fault.is_range for fault in self.faults):
             return self
         numbered = enumerate(self.faults)
         return replace(self, faults=tuple(f.draw(draws(seed, k, _AMOUNT)) for k, f in numbered))
 
     def faults_of(self, group: str, c: int, step: int | None) -> list[NumberedFault]:
-        """Return the faults of a group that camera c has at a step, or at any step if None."""
+        """Return the faults of a group in camera c at a step, or at any step if `step` is None."""
         name = self.cameras[c].name
         return [
             NumberedFault(k, fault)
@@ -122,12 +124,12 @@ class Schedule:
     def actual_cameras(
         self, rig: tuple[PinholeCamera, ...], seed: int, step: int
     ) -> tuple[PinholeCamera, ...]:
-        """Return the cameras with their actual poses at a step, or `rig` itself without faults.
+        """Return the cameras with their actual poses at a step, or `rig` if there are no faults.
 
         Args:
             rig: cameras with their calibrated poses.
             seed: seed of the episode's faults.
-            step: the step.
+            step: number of the step.
         """
         wrong = tuple(tuple(self.faults_of(PLACE, c, step)) for c in range(len(rig)))
         return _displace(rig, wrong, seed) if any(wrong) else rig
@@ -146,12 +148,12 @@ class Schedule:
         return due
 
     def _delay(self, c: int, taken: int | None) -> int:
-        """Return the delay of an image taken at a step, or the maximum delay if None [steps]."""
+        """Return the delay of an image taken at a step [steps]; the maximum if `taken` is None."""
         late_s = sum(self._amounts("late", c, taken))
         return math.ceil((self.cameras[c].latency_s + late_s) / self.dt_s - _EARLY)
 
     def _scene_step(self, taken: int, c: int) -> int:
-        """Return the step of the scene that an image taken at a step shows."""
+        """Return the step of the scene that is shown by an image taken at a step."""
         for _, fault in self.faults_of(TIMING, c, taken):
             if fault.kind == "frozen":
                 return self._frozen_at(fault)
@@ -164,12 +166,12 @@ class Schedule:
         ]
 
     def _frozen_at(self, fault: FaultConfig) -> int:
-        """Return the last step before a camera freezes."""
+        """Return the last step before a fault freezes the camera's image."""
         return max(0, math.ceil(fault.start_s / self.dt_s - _EARLY) - 1)
 
 
 class History(Stateful):
-    """The history of B environments: records of those past steps that an image may show.
+    """The history of B environments: records of the past steps that may be shown by an image.
 
     Args:
         batch: number B of environments.
@@ -186,12 +188,12 @@ class History(Stateful):
         """(B,) seed of the faults of each environment's episode."""
         self._kept: list[dict[int, Any]] = [{} for _ in range(batch)]
         self._episodes: dict[int, tuple[int, Schedule]] = {}
-        """Seed of the faults, and schedule, of each environment's episode."""
+        """Seed of the faults and schedule of each environment's episode, by index."""
         self._reach = max(1, schedule.longest_memory)
         self._pinned = schedule.frozen_steps
 
     def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-        """Reset environments `ids`, with seeds drawn from children of their generators."""
+        """Reset environments `ids`, with seeds sampled from children of their generators."""
         for b in ids.tolist():
             child = rngs[b].spawn(1)[0]
             self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}

@@ -1,9 +1,9 @@
 """Affinity between a 2D pose in one camera and a body with predicted joints.
 
 Each joint contributes the log-likelihood ratio of a detection near its predicted pixel against one
-anywhere in the image; the penalty of a gross error is limited by the gate. The errors of a body's
-joints are correlated; therefore the affinity is the mean over joints, not the sum. A detector may
-swap left and right; therefore the affinity is the larger of those with and without a swap.
+anywhere in the image; the gate limits the penalty of a gross error. The errors of a body's joints
+are correlated; therefore the affinity is the mean over joints, not the sum. A detector may swap
+left and right; therefore the affinity is the larger of those with and without a swap.
 """
 
 import math
@@ -20,7 +20,7 @@ from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import compute_pixel_variance
 
 LEAST_JOINTS = 3
-"""Minimum number of joints of a pose that can belong to a worker."""
+"""Minimum number of joints in a pose that can be assigned to a worker."""
 FULL_JOINTS = 6
 """Number of joints below which the affinity of a pose is reduced in proportion."""
 _ISOTROPIC = np.eye(3)
@@ -48,11 +48,11 @@ class AssociationSettings(NamedTuple):
     """The fields of `AssociationConfig` as a named tuple, for compiled functions."""
 
     gate_sigma: float
-    """Gate of a joint around its predicted pixel, in standard deviations."""
+    """Gate around the predicted pixel of a joint, in standard deviations."""
     prediction_std_m: float
     """Standard deviation of errors that predictions do not account for [m]."""
     min_joints: int
-    """Number of joints on which two cameras must agree for a new person."""
+    """Number of joints on which two cameras must agree to detect a new person."""
     merge_distance_m: float
     """Distance between two bodies below which they are considered one person [m]."""
     rejoin_distance_m: float
@@ -76,7 +76,7 @@ def project_body(
         camera: (3, 4) projection.
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        known: (J,) whether the joint's position is known.
+        known: (J,) mask of the joints of known position.
         prediction_std_m: standard deviation of errors that `cov` does not include [m].
         image: (J, 3) u, v [px] and their mean variance [px^2], filled in. The variance is -1 for
             joints that are unknown or not in front of the camera.

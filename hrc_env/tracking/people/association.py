@@ -62,13 +62,13 @@ class AssociationConfig:
     """Current names of renamed fields, by their former names."""
 
     gate_sigma: float = 5.0
-    """Gate of a joint around its predicted pixel, in standard deviations. At least half of a pose's
-    joints must be within it."""
+    """Gate around the predicted pixel of a joint, in standard deviations. At least half of a pose's
+    joints must be within their gates."""
     prediction_std_m: float = 0.05
     """Standard deviation of errors that predictions do not account for [m], such as persistent
     errors of the detector and sudden movements."""
     min_joints: int = 8
-    """Number of joints, out of 15, on which two cameras must agree for a new person."""
+    """Number of joints, out of 15, on which two cameras must agree to detect a new person."""
     merge_distance_m: float = 0.35
     """Distance between two bodies below which they are considered one person [m]."""
     rejoin_distance_m: float = 1.0
@@ -101,7 +101,7 @@ def associate(
 
     Args:
         P: (C, 3, 4) projections from the world [m] to pixels.
-        detected: (B, C, D, J, ...) D poses per camera in any order; missing ones are NaN.
+        detected: (B, C, D, J, ...) D poses per camera in any order; missing poses are NaN.
         predicted: (B, W, ...) prediction of the workers for the time of these frames.
         config: settings of the assignment; None for the defaults.
 
@@ -193,10 +193,10 @@ def _assign_to_tracked(
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) poses in each camera; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
         cov: (W, J, 3, 3) covariances of the joints [m^2].
-        tracked: (W,) whether the worker is tracked.
+        tracked: (W,) mask of the tracked workers.
         settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
@@ -230,13 +230,13 @@ def _assign_new_people(
     settings: AssociationSettings,
     chosen: Ints,
 ) -> None:
-    """Assign the poses of each body that several cameras see to the worker that it belongs to.
+    """Assign the poses of each body that several cameras see to a worker.
 
     Args:
         cameras: (C,) cameras.
-        poses: (C, D) poses in each camera; assigned ones are no longer free.
+        poses: (C, D) poses in each camera; assigned poses are marked as not free.
         mean: (W, J, 3) predicted joints [m].
-        tracked: (W,) whether the worker is tracked.
+        tracked: (W,) mask of the tracked workers.
         settings: settings of the assignment.
         chosen: (C, W) index of the assigned pose, filled in.
     """
@@ -327,9 +327,9 @@ def _find_worker(
     Args:
         body: the body.
         mean: (W, J, 3) joints of the workers [m].
-        tracked: (W,) whether the worker has a track.
-        vacant: (W,) whether the slot has no track.
-        unseen: (W,) whether the worker has a track but no camera sees the worker.
+        tracked: (W,) mask of the tracked workers.
+        vacant: (W,) mask of the slots without a track.
+        unseen: (W,) mask of the tracked workers that no camera sees.
         settings: settings that contain these distances.
     """
     distance = np.empty(len(tracked))
@@ -347,7 +347,7 @@ def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
 
     Args:
         distance: (W,) distances [m].
-        among: (W,) whether the worker may be chosen.
+        among: (W,) mask of the workers that may be chosen.
         limit: distance below which a worker may be chosen [m].
     """
     best = -1
@@ -361,7 +361,7 @@ def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
 def _measure_distance(body: Body, mean: Points3) -> float:
     """Return the distance between a body and a worker (J, 3) [m]; infinite without common joints.
 
-    It is the distance between the mean positions of the joints that both have.
+    The distance is measured between the mean positions of the joints that both have.
     """
     points, met = body.points, body.met
     n, dx, dy, dz = 0, 0.0, 0.0, 0.0

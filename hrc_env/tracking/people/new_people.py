@@ -26,39 +26,40 @@ from hrc_env.tracking.people.affinity import (
 )
 
 MEETING_M = 0.03
-"""Standard deviation of the gap between two lines of sight apart from pixel noise [m]."""
+"""Standard deviation of the gap between two lines of sight that is not due to pixel noise [m]."""
 AGREEING_SHARE = 0.6
-"""Minimum share of two poses' common joints for which the lines of sight must meet."""
+"""Minimum fraction of the joints common to two poses at which their lines of sight must meet."""
 SHORTEST = 0.5
-"""Minimum length of a bone, relative to the population mean."""
+"""Minimum length of a plausible bone, relative to the population mean."""
 LONGEST = 1.6
-"""Maximum length of a bone, relative to the population mean."""
+"""Maximum length of a plausible bone, relative to the population mean."""
 BONE_SLACK_M = 0.08
 """Tolerance added to both limits of a bone's length [m]."""
 GOOD_BONES = 0.7
-"""Minimum share of a body's bones with lengths within the limits."""
+"""Minimum fraction of a body's bones with lengths within the limits."""
 BODY_SLACK_M = 0.1
-"""Standard deviation of a body made from two poses, for the comparison with other cameras [m]."""
+"""Standard deviation of the joints of a body triangulated from two poses [m]. It is used to compare
+the body with the poses in other cameras."""
 
 
 class Body(NamedTuple):
-    """A body made from the poses in two cameras."""
+    """A body triangulated from the poses in two cameras."""
 
     points: Points3
-    """(J, 3) points where the lines of sight meet [m]."""
+    """(J, 3) positions of the joints, where the lines of sight meet [m]."""
     met: Bools
-    """(J,) whether the joint's lines of sight meet; other points are undefined."""
+    """(J,) mask of the joints at which the lines of sight meet; other positions are undefined."""
 
 
 class Proposals(NamedTuple):
-    """Arrays for N bodies proposed by pairs of cameras, filled from the front."""
+    """Arrays for up to N bodies proposed by pairs of cameras; the first rows are filled."""
 
     seeds: Ints
     """(N, 4) indices of the first camera, its pose, the second camera and its pose."""
     members: Ints
     """(N, C) index of each camera's pose that fits the body best; -1 if there is none."""
     scores: Floats
-    """(N, C) affinities of these poses."""
+    """(N, C) affinity of each of these poses to the body."""
 
 
 @kernel(makes_arrays=True)
@@ -99,11 +100,11 @@ def intersect_poses(
         pose_1: the first pose, with its lines of sight.
         pose_2: the second pose, with its lines of sight.
         gate_sigma: gap up to which two lines meet, in standard deviations.
-        body: the points, filled in.
+        body: the triangulated body, filled in.
 
     Returns:
-        The number of joints for which the lines meet, or 0 if these are too few of the common
-        joints.
+        The number of joints at which the lines meet, or 0 if their fraction of the common joints is
+        too small.
     """
     points, met, ok_1, ok_2 = body.points, body.met, pose_1.ok, pose_2.ok
     n_common, n_met = 0, 0

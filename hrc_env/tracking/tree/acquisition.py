@@ -1,4 +1,4 @@
-"""Acquisition of bodies on which views agree: tracks are started, repaired and ended.
+"""Initialization, repair and termination of tracks, based on bodies on which views agree.
 
 The lines of sight of two cameras meet at the limbs only if both cameras label left and right alike.
 This divides the cameras into two groups before a body is known. The sizes of the groups, and the
@@ -27,17 +27,17 @@ _LEAST_VARIANCE = 1e-4
 WIDEST_STD_M = 0.5
 """Standard deviation above which a triangulated joint is not used [m]."""
 _GUESS_STD_M = 0.3
-"""Standard deviation of a joint guessed from a body of known heading [m]."""
+"""Standard deviation of the position of a joint guessed from a body of known heading [m]."""
 _GUESS_STD_WITHOUT_HEADING_M = 0.6
-"""Standard deviation of a joint guessed from a body of unknown heading [m]."""
+"""Standard deviation of the position of a joint guessed from a body of unknown heading [m]."""
 _MIRROR = tuple(int(j) for j in MIRROR)
 _SWAP_COST = 4.0
 """Negative log-probability that a camera swaps left and right labels [nat]."""
 _MOST = 5.0
 """Upper bound of the misfit of one joint [nat]."""
 _FITS = 0.4
-"""Mean misfit, relative to its upper bound, above which two cameras are not compared, because one
-of them may be rotated relative to its calibration."""
+"""Mean misfit, relative to its upper bound, above which two cameras are not compared. One of them
+may be rotated relative to its calibration."""
 _FOUND_SPEED_STD_M_S = 1.0
 """Standard deviation of the speed of a joint that has just been acquired [m/s]."""
 _FURTHEST_STD = 8.0
@@ -48,7 +48,7 @@ class Misfit(NamedTuple):
     """Misfit between the lines of sight of two cameras."""
 
     total: float
-    """Negative log-likelihood over the joints [nat]."""
+    """Negative log-likelihood, summed over the joints [nat]."""
     n_joints: int
     """Number of joints that both cameras measured."""
 
@@ -89,7 +89,7 @@ def acquire(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel(makes_arrays=True)
 def _place_joint(body: Floats, cov: Floats, point: Floats, spread: Floats) -> None:
-    """Set a joint to rest at a point.
+    """Set a joint to a position at rest.
 
     Args:
         body: (6,) position and velocity, filled in.
@@ -113,7 +113,7 @@ def find_body(frame: Frame, settings: Settings, points: Floats, cov: Floats, fou
         settings: settings of the estimator.
         points: (J, 3) positions [m], filled in.
         cov: (J, 3, 3) covariances of the positions [m^2], filled in.
-        found: (J,) whether the joint was triangulated, filled in.
+        found: (J,) mask of the triangulated joints, filled in.
 
     Returns:
         Whether enough joints were triangulated for a body.
@@ -163,12 +163,12 @@ def _triangulate(
 
 @kernel(makes_arrays=True)
 def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) -> int:
-    """Drop joints that are too uncertain or too far from the others; return the number of the rest.
+    """Drop joints that are too uncertain or too far from the others; return how many remain.
 
     Args:
         points: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        found: (J,) whether the joint is used, changed in place.
+        found: (J,) mask of the joints that are used, changed in place.
         radius_m: largest distance of a joint from the centre of the body [m].
     """
     middle, n_found = np.empty(3), 0
@@ -191,7 +191,7 @@ def find_middle(points: Floats, among: Bools, out: Floats) -> bool:
 
     Args:
         points: (J, 3+) positions [m].
-        among: (J,) whether the point is used.
+        among: (J,) mask of the points that are used.
         out: (3,) median [m], filled in.
     """
     values = np.empty(len(points))
@@ -220,7 +220,7 @@ def complete_body(points: Floats, cov: Floats, found: Bools) -> None:
     Args:
         points: (J, 3) positions [m], filled in for missing joints.
         cov: (J, 3, 3) covariances of the positions [m^2], filled in for missing joints.
-        found: (J,) whether the joint is given.
+        found: (J,) mask of the joints that are not missing.
     """
     heading = find_heading_from(points, found[1] and found[2], found[7] and found[8])
     cos, sin = heading.cos, heading.sin
@@ -276,7 +276,8 @@ def agree_on_sides(frame: Frame, settings: Settings) -> None:
 def _find_camp(gain: Floats) -> Bools:
     """Return a mask (C,) of the minority of cameras that label left and right unlike the others.
 
-    `gain` (C, C) is the decrease of the misfit of two cameras [nat] if one of them is mirrored.
+    `gain` (C, C) is the decrease of the misfit of each pair of cameras if one of the two is
+    mirrored [nat].
     """
     other = gain[0] > _SWAP_COST
     for _ in range(len(gain)):
@@ -298,7 +299,7 @@ def _find_camp(gain: Floats) -> Bools:
 
 @kernel(makes_arrays=True)
 def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
-    """Return the decrease [nat] of the misfit of cameras a and b if one of them is mirrored."""
+    """Return the decrease of the misfit of cameras `a` and `b` if one of them is mirrored [nat]."""
     direct, exchanged = _measure_misfit(frame, a, b, False), _measure_misfit(frame, a, b, True)
     is_fitting = min(direct.total, exchanged.total) < _FITS * _MOST * direct.n_joints
     return direct.total - exchanged.total if is_fitting else 0.0
@@ -306,7 +307,7 @@ def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
 
 @kernel(makes_arrays=True)
 def _measure_misfit(frame: Frame, a: int, b: int, is_mirrored: bool) -> Misfit:
-    """Return the misfit of the joints that have a left and a right side in two cameras.
+    """Return the misfit between two cameras over all joints that occur on both sides of the body.
 
     Args:
         frame: the measurements.
@@ -361,7 +362,7 @@ def _find_joints_again(
         tree: the updated hypothesis, changed in place.
         frame: the measurements.
         settings: settings of the estimator.
-        is_placed: (J,) set to 1 for these joints, in place.
+        is_placed: (J,) flags, set to 1 for the reacquired joints.
     """
     everything, middle = np.ones(len(is_placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
@@ -376,7 +377,7 @@ def _find_joints_again(
 
 @kernel
 def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Reacquire the whole body if enough joints are contradicted; return whether it succeeded."""
+    """Reacquire the whole body if enough joints are contradicted; return whether this succeeds."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= settings.conflict_frames
@@ -390,14 +391,14 @@ def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
 def _repair(tree: Tree, settings: Settings) -> bool:
     """Repair covariances that are not positive definite, and reset an implausible body.
 
-    Such a covariance loses everything but its diagonal. If any joint is not finite, or more than
-    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are put back to
-    the prior, at rest, and the track is lost.
+    Such a covariance is replaced by its diagonal. If any joint is not finite, or more than
+    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are reset to the
+    prior, at rest, and the track is lost.
 
     Args:
         tree: the hypothesis, changed in place: `body` (J, 6) positions [m] and velocities [m/s] in
-            the world frame, `cov` (J, 6, 6) their covariances.
-        settings: mean and standard deviation of the prior position, and greatest age.
+            the world frame, `cov` (J, 6, 6) covariances of both.
+        settings: mean and standard deviation of the prior position, and maximum age.
 
     Returns:
         True if nothing had to be changed.

@@ -38,7 +38,7 @@ from hrc_env.tracking.tree.update import condition_on_frame
 
 _TORSO = (1, 2, 7, 8)
 _WALKING_M_S = 0.5
-"""Speed along the heading from which a body certainly walks forwards [m/s]."""
+"""Minimum speed along the heading at which a body certainly walks forwards [m/s]."""
 
 
 @kernel(makes_arrays=True)
@@ -92,7 +92,7 @@ def _update_worker(
     work: Work,
     prior: Records1[Tree],
 ) -> None:
-    """Update the hypotheses about a tracked worker, and search for alternatives if that is due.
+    """Update the hypotheses about a tracked worker, and search for alternatives if a search is due.
 
     Args:
         worker: the worker's hypotheses, changed in place.
@@ -154,7 +154,7 @@ def select_worker(state: Hypotheses, b: int, w: int) -> WorkerHypotheses:
 def predict_all(
     state: Hypotheses, model: MotionModel, dt: float, settings: Settings, works: Records1[Work]
 ) -> None:
-    """Predict every worker's hypotheses after a time step.
+    """Predict the hypotheses about all workers after a time step.
 
     Args:
         state: the hypotheses, changed in place.
@@ -177,7 +177,7 @@ def predict_all(
 def _move_worker(
     worker: WorkerHypotheses, model: MotionModel, dt: float, settings: Settings, work: Work
 ) -> None:
-    """Move a worker's hypotheses; if there are several, joint offsets are not learnt.
+    """Predict a worker's hypotheses; joint offsets are learnt only if there is a single hypothesis.
 
     Args:
         worker: the worker's hypotheses, changed in place.
@@ -221,7 +221,7 @@ def _age_worker(worker: WorkerHypotheses, dt: float, settings: Settings) -> None
 
 @kernel
 def _score_walk(body: Floats) -> float:
-    """Return a score from -1, if a body (J, 6) walks backwards, to 1, if it walks forwards."""
+    """Return a score between -1 if a body (J, 6) walks backwards and 1 if it walks forwards."""
     heading = find_heading(body)
     if not heading.is_known:
         return 0.0

@@ -1,4 +1,4 @@
-"""Search for alternative bodies that one view can hardly distinguish from the tracked one.
+"""Search for alternative bodies that are hard to distinguish from the tracked one in one view.
 
 In one view, a limb that points towards the camera looks almost like one that points away from it
 (the bas-relief ambiguity). To find the alternative, a limb is reflected: its joints stay on their
@@ -7,9 +7,9 @@ searched for with the same prediction and frame. If the mode is several posterio
 deviations from the existing ones and its evidence is not negligible, it becomes a hypothesis.
 
 A whole body is rotated instead, because in one view a shoulder line that recedes looks like one
-that approaches. The alternative has its shoulders and hips reflected across the ray to its centre.
-It is not a mirror image, but the same body rotated, with nose and toes in front again. Its
-covariance is the reflected one, because the uncertainty lies along the same ray.
+that approaches. The shoulders and hips of the alternative are reflected across the ray to the
+body's centre. The alternative is not a mirror image, but the same body rotated, with nose and toes
+in front again. Its covariance is reflected, because the uncertainty lies along the same ray.
 """
 
 import math
@@ -45,16 +45,17 @@ _DISTINCT = 3.0
 """Distance from the existing hypotheses above which a mode is new, in posterior standard
 deviations."""
 _SEARCH_STEPS = 4
-"""Number of Gauss-Newton steps from a reflected limb."""
+"""Number of Gauss-Newton steps in a search that starts from a reflected limb."""
 _NEARER_M = 0.05
-"""Largest coordinate difference of joints below which two modes are the same [m]."""
+"""Maximum difference of each coordinate of the joints at which two modes are considered the same
+[m]."""
 
 
 class Part(NamedTuple):
     """A part of the body that may be reflected."""
 
     pivot: tuple[int, ...]
-    """Indices of the joints with the pivot as their mean."""
+    """Indices of the joints of which the mean position is the pivot."""
     moved: tuple[int, ...]
     """Indices of the joints that are reflected."""
 
@@ -76,10 +77,11 @@ N_PARTS = len(_PARTS)
 WHOLE_BODY = 0
 """Index of the part that is the whole body; the other parts are limbs and the head."""
 _MOST_SEEN_TWICE = 2
-"""Largest number of joints that several cameras may see if a body counts as seen by one camera."""
+"""Maximum number of joints seen by several cameras at which a body is considered seen by only
+one."""
 _TORSO = (1, 2, 7, 8)
 _LEAST_TURN_RAD = 0.35
-"""Angle between two headings below which two bodies are the same hypothesis [rad]."""
+"""Angle between the headings of two bodies below which they are the same hypothesis [rad]."""
 
 
 def _mark_joints(joints: list[tuple[int, ...]]) -> Bools:
@@ -105,7 +107,7 @@ def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings) -> int:
-    """Return the only camera that sees a part if the part's depth is ambiguous, or else -1.
+    """Return the only camera that sees a part if the part's depth is ambiguous, otherwise -1.
 
     The depth of a part that one camera sees is not ambiguous if recent measurements by other
     cameras still determine the predicted depth.
@@ -139,7 +141,7 @@ def branch(
     Args:
         worker: the hypotheses about one worker, of which the first has been updated.
         prior: (1,) the first hypothesis before its update.
-        evidence: log-evidence of that update.
+        evidence: log-evidence of the first hypothesis's update.
         frame: the measurements.
         settings: settings of the estimator.
         work: work arrays.
@@ -204,7 +206,7 @@ def _try_turned_body(
 
 @kernel(makes_arrays=True)
 def _restore_prediction(tree: Tree, prior: Tree) -> None:
-    """Restore the Gaussian of a tree before its update, without its lengths and offsets."""
+    """Restore the Gaussian of a tree before its update; bone lengths and offsets are unchanged."""
     tree.body[:], tree.cov[:], tree.slope[:] = prior.body, prior.cov, prior.slope
 
 
@@ -268,7 +270,7 @@ def find_lone_camera(part: int, ok: Bools) -> int:
 
     Args:
         part: index of the part.
-        ok: (J, C) whether the camera measured the joint.
+        ok: (J, C) mask of the joints that each camera measured.
     """
     n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
     for c in range(n_cameras):
@@ -381,7 +383,7 @@ def turn_body(eye: Floats, turn: float, body: Floats, cov: Floats, slope: Floats
         turn: angle about the vertical, as `find_other_turn` returns it [rad].
         body: (J, 6) means, changed in place.
         cov: (J, 6, 6) covariances, reflected in place along the ray to the body's centre.
-        slope: (J, 6, 6) slopes on the parents, reflected likewise.
+        slope: (J, 6, 6) slopes on the parents, reflected in the same way.
     """
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)
     for j in _TORSO:

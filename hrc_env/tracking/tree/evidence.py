@@ -11,8 +11,8 @@ conditional covariance R_j = C_j - B_j C_q B_j' of joint j given its parent q, d
 of all det R_j. Terms that all hypotheses share are omitted.
 
 Bodies have nose, toes and knees in front, but a body that is tracked mirrored in depth has them
-behind. This plausibility of the current pose replaces that of the previous pose in the weight;
-therefore it does not accumulate over frames.
+behind. Therefore the weight also contains the plausibility of the current pose, which replaces that
+of the previous pose and does not accumulate over frames.
 """
 
 import math
@@ -34,16 +34,16 @@ _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 
 
 class Feature(NamedTuple):
-    """Distribution of a joint's position along the heading, relative to the mean of two others."""
+    """Distribution of a joint's position along the heading, relative to two other joints."""
 
     joint: int
     """Index of the joint."""
     first: int
-    """Index of the first other joint."""
+    """Index of the first of the two other joints."""
     second: int
-    """Index of the second other joint."""
+    """Index of the second of the two other joints."""
     ahead_m: float
-    """Mean distance of the joint in front of the mean of the two others [m]."""
+    """Mean distance by which the joint is in front of the mean position of the two others [m]."""
     std_m: float
     """Standard deviation of that distance [m]."""
 
@@ -57,7 +57,7 @@ _FEATURES = (
     Feature(3, 1, 5, -0.05, 0.12),  # the elbows behind the arms
     Feature(4, 2, 6, -0.05, 0.12),
 )
-"""Expected positions of nose, toes, knees and elbows, estimated from common proportions; the
+"""Expected positions of nose, toes, knees and elbows, estimated from typical body proportions. The
 standard deviations allow for turned heads and feet."""
 _MOST = 4.5
 """Upper bound of the penalty of one feature [nat], which corresponds to three standard
@@ -67,7 +67,7 @@ _CLOSE = 2.0
 
 
 class TreeMeasure(NamedTuple):
-    """Size of a change of the body under a Gaussian on the tree, and the Gaussian's determinant."""
+    """Mahalanobis length of a change of the body under a Gaussian on the tree; its determinant."""
 
     squared: float
     """Squared Mahalanobis length of the change."""
@@ -79,9 +79,9 @@ class Heading(NamedTuple):
     """The direction in which a body faces, projected onto the floor."""
 
     cos: float
-    """Cosine of the angle from the world's x axis; 0 if unknown."""
+    """Cosine of the angle from the world's x axis; 0 if the heading is unknown."""
     sin: float
-    """Sine of the angle from the world's x axis; 0 if unknown."""
+    """Sine of the angle from the world's x axis; 0 if the heading is unknown."""
     is_known: bool
     """Whether the left and right joints are far enough apart, seen from above, for a heading."""
 
@@ -124,8 +124,9 @@ def _log_likelihood_of_pixels(body: Floats, frame: Frame, inlier_odds: float) ->
     Args:
         body: (J, 6) positions [m] and velocities [m/s] of the joints in the world frame.
         frame: the measurements: `P` (C, 3, 4) projections, `z` (J, C, 2) pixels, `sigma` (J, C)
-            their standard deviations [px], `ok` (J, C) whether they exist.
-        inlier_odds: odds of an inlier, times the outliers' area in the image, over 2 pi [px^2].
+            their standard deviations [px], `ok` (J, C) whether there is a measurement.
+        inlier_odds: odds that a measurement without residual is an inlier, times its pixel variance
+            [px^2].
     """
     projections, pixels, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
@@ -211,7 +212,7 @@ def _measure_diagonal(a: Floats, x: Floats) -> TreeMeasure:
 
 @kernel
 def _log_likelihood_of_bones(body: Floats, length: Floats, variance: Floats) -> float:
-    """Return the log-likelihood of the tree's edges, and of the nose's second bone.
+    """Return the log-likelihood of the bones on the tree's edges and of the nose's second bone.
 
     Args:
         body: (J, 6) positions and velocities.
@@ -242,7 +243,7 @@ def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
 
 @kernel
 def distance_between(one: Tree, other: Tree, work: Work) -> float:
-    """Return the squared Mahalanobis distance between two trees under the wider of them."""
+    """Return the squared Mahalanobis distance between two trees under the wider Gaussian."""
     least = np.inf
     for tree in (one, other):
         for j in range(len(one.body)):
@@ -340,7 +341,7 @@ def exchange_slots(worker: WorkerHypotheses, one: int, other: int) -> None:
 
 @kernel(makes_arrays=True)
 def drop_hypothesis(worker: WorkerHypotheses, h: int) -> None:
-    """Drop hypothesis `h` of several about a worker; the last one takes its slot."""
+    """Drop hypothesis `h` about a worker and move the last hypothesis to its slot."""
     last = worker.n_alive[0] - 1
     if h != last:
         copy_slot(worker, last, h)

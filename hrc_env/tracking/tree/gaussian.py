@@ -19,11 +19,11 @@ PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
 """Parent of each joint; -1 for the root. The left shoulder is the parent of the nose, the right
 shoulder, the left elbow and the left hip."""
 ORDER = (1, 0, 2, 7, 8, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14)
-"""Joints in an order in which parents precede their children."""
+"""Indices of the joints in an order in which parents precede their children."""
 LEAVES_FIRST = ORDER[::-1]
-"""Joints in an order in which children precede their parents."""
+"""Indices of the joints in an order in which children precede their parents."""
 ROOT = ORDER[0]
-"""The joint without a parent, the left shoulder."""
+"""Index of the joint without a parent, the left shoulder."""
 _ends = [tuple(sorted(int(end) for end in ends)) for ends in BONES]
 EDGE_BONE = tuple(
     _ends.index((min(j, PARENT[j]), max(j, PARENT[j]))) if j != ROOT else -1
@@ -39,34 +39,34 @@ class Row6(NamedTuple):
     """One row of a 6x6 matrix."""
 
     c0: float
-    """Column 0."""
+    """Entry in column 0."""
     c1: float
-    """Column 1."""
+    """Entry in column 1."""
     c2: float
-    """Column 2."""
+    """Entry in column 2."""
     c3: float
-    """Column 3."""
+    """Entry in column 3."""
     c4: float
-    """Column 4."""
+    """Entry in column 4."""
     c5: float
-    """Column 5."""
+    """Entry in column 5."""
 
 
 class Inverse3(NamedTuple):
     """Lower triangle of the inverse of a symmetric 3x3 matrix, and whether the inverse is valid."""
 
     a00: float
-    """Entry 00."""
+    """Entry (0, 0)."""
     a10: float
-    """Entry 10."""
+    """Entry (1, 0)."""
     a11: float
-    """Entry 11."""
+    """Entry (1, 1)."""
     a20: float
-    """Entry 20."""
+    """Entry (2, 0)."""
     a21: float
-    """Entry 21."""
+    """Entry (2, 1)."""
     a22: float
-    """Entry 22."""
+    """Entry (2, 2)."""
     is_positive: bool
     """Whether the matrix is positive definite."""
 
@@ -131,7 +131,7 @@ def multiply_transposed(a: Floats, b: Floats, out: Floats) -> None:
 def invert_half(a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> Inverse3:
     """Return the inverse of a symmetric 3x3 matrix from its L D L' factors.
 
-    Unlike the cofactor formula, it loses no digits if the matrix is nearly singular.
+    Unlike the cofactor formula, this remains accurate if the matrix is nearly singular.
 
     Args:
         a00: element (0, 0) of the lower triangle.
@@ -205,7 +205,7 @@ def is_positive_definite(a: Floats) -> bool:
 def invert(a: Floats, out: Floats) -> bool:
     """Compute the inverse of a symmetric 6x6 matrix in `out`; return whether it is valid.
 
-    It is valid if the matrix is positive definite.
+    The inverse is valid if the matrix is positive definite.
     """
     blocks = _factor(a)
     p, x, y, z, v = blocks.upper, blocks.x, blocks.y, blocks.z, blocks.lower

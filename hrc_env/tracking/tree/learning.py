@@ -8,13 +8,14 @@ factor = V (1 - L + L (1 + a r) / (1 - a r)).
 
 V is the ratio of true to reported variance. To estimate it, each joint is triangulated from the
 present frame alone, because the prediction already includes a camera's persistent error. The square
-of a camera's residual is divided by its redundancy, the share that the triangulated point does not
-absorb (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the variance that
-persists, from the products of these residuals with those of the previous update; r is the
-correlation of the persistent part over one update; a is the weight of the prediction in the
-estimate of the joint, tr(posterior covariance, predicted covariance^-1) / 3.
+of a camera's residual is divided by its redundancy, the fraction that the triangulated point does
+not absorb (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is the fraction of the
+variance that persists, estimated from the products of these residuals with those of the previous
+update; r is the correlation of the persistent part over one update; a is the weight of the
+prediction in the estimate of the joint, tr(posterior covariance, predicted covariance^-1) / 3.
 
-Each bone length has a scalar Kalman filter, which learns while two views see both ends.
+Each bone length is estimated by a scalar Kalman filter, which is updated while two views see both
+ends of the bone.
 """
 
 import math
@@ -42,44 +43,45 @@ from hrc_env.tracking.tree.state import (
 )
 
 _TURNS = 2
-"""Number of groups of joints, of which one is used in each update. Successive frames are similar;
-therefore this saves time without loss of information."""
+"""Number of groups of joints, of which only one is used for learning in each update. Successive
+frames are similar; therefore this saves time without loss of information."""
 _CAMERA_WEIGHT = 50.0
 """Weight of the reported noise as a prior for the camera's noise, in units of redundancy."""
 _JOINT_WEIGHT = 100.0
 """Weight of the camera's noise as a prior for the noise of each joint, in units of redundancy."""
 _SHARE_WEIGHT = 600.0
-"""Weight of the assumed share of persistent variance as a prior, in squared residuals. It is large
-because two views alone reveal the true share late."""
+"""Weight of the prior for the fraction of persistent variance, as a number of squared residuals. It
+is large because two views alone reveal the true fraction only slowly."""
 _CHANCE = 0.07
-"""Twice the standard deviation of the estimated share if no error persists."""
+"""Twice the standard deviation of the estimated fraction of persistent variance if no error
+persists."""
 _CORRELATED_UPDATES = 10.0
-"""Number of updates for which errors of a bone's length persist."""
+"""Number of updates for which the errors of a measured bone length persist."""
 _GATE_SIGMA = 3.0
 """Number of standard deviations beyond which a measurement of a bone's length is ignored."""
 _LEAST_VARIANCE = 1e-5
 """Minimum variance of a bone's length [m^2]."""
 _OPEN_M = 0.5
-"""Standard deviation of a joint about its mean in the triangulation [m]. It regularises positions
-along a ray that two views share."""
+"""Prior standard deviation of a joint about its mean in the triangulation [m]. It regularises
+positions on a ray that two views share."""
 _LEAST_BELIEF = 0.5
 """Inlier probability up to which a measurement is not used for learning."""
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
 class NoiseModel(NamedTuple):
-    """Constants for learning the factors on the reported variances."""
+    """Constants for learning the factors applied to the variances that the detector reports."""
 
     keep: float
-    """Share of a joint's statistics that is kept when the joint is used again."""
+    """Fraction of a joint's statistics that is retained when the joint is used again."""
     correlation: float
     """Correlation r of persistent errors over one update."""
     share: float
-    """Prior share L of the variance that persists."""
+    """Prior fraction L of the variance that persists."""
     min_factor: float
-    """Lower bound of the factors."""
+    """Lower bound of the learnt factors."""
     max_factor: float
-    """Upper bound of the factors; equal to the lower bound if nothing is learnt."""
+    """Upper bound of the learnt factors; equal to the lower bound if nothing is learnt."""
 
 
 def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
@@ -206,8 +208,8 @@ def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats
 def _add_residuals(view: Floats, spread: Floats, noise: Records1[Noise], model: NoiseModel) -> None:
     """Add one joint's residuals about its triangulated point to the statistics of its noise.
 
-    The previous residuals decay like persistent errors. Therefore the ratio of products with them
-    to their squares estimates the same share after any time.
+    The stored previous residuals decay as persistent errors do. Therefore the ratio of the products
+    to the squares estimates the same fraction after any time.
 
     Args:
         view: (C, 8) rows of the cameras, from `_triangulate`.
@@ -285,10 +287,10 @@ def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel)
 
 @kernel
 def learn_lengths(tree: Tree, n_views: Ints) -> None:
-    """Learn a hypothesis's lengths of bones with both ends measured by two cameras.
+    """Learn the lengths of bones of which both ends are measured by at least two cameras.
 
-    Each length has a Kalman filter, whose measurement noise is multiplied by the number of updates
-    for which errors persist.
+    Each length is estimated by a Kalman filter. Its measurement noise is multiplied by the number
+    of updates for which errors persist.
 
     Args:
         tree: the updated hypothesis, changed in place.

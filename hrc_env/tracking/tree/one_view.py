@@ -1,4 +1,4 @@
-"""Tracks started from one view, by fitting a standing body of average size in several headings.
+"""Track initialization from one view, by fits of an average standing body in several headings.
 
 The assumed size determines the depth. The uncertainty of the size, by which the body may be larger
 and farther, is stored separately from the Gaussian (`Tree.size_std`) and included in the reported
@@ -29,11 +29,11 @@ _N_TURNS = 8
 _SEARCH_STEPS = 6
 """Number of Gauss-Newton steps from each heading."""
 _LEAST_EVIDENCE = 2.0
-"""Minimum evidence for a body per detected joint [nat]. People have at least 4; random points in a
-box as large as a body rarely reach this value."""
+"""Minimum evidence for a body per detected joint [nat]. It is at least 4 for people; random points
+in a box as large as a body rarely reach this minimum."""
 _POSE_STD_M = 0.2
 """Standard deviation of a joint's position relative to its parent before the search [m]. Like the
-next three values, it is an estimate, wide enough for bodies that bend and walk."""
+next three values, it is an estimate that is large enough for bodies that bend and walk."""
 _ROOT_STD_M = 0.3
 """Standard deviation of the root's position on each axis [m]."""
 _ROOT_SPEED_STD_M_S = 1.0
@@ -41,7 +41,8 @@ _ROOT_SPEED_STD_M_S = 1.0
 _DEPTH_SHARE = 0.3
 """Relative standard deviation of the root's depth."""
 _UNSEEN_UPDATES = 100
-"""Number of updates for which the other cameras are assumed not to have seen the worker."""
+"""Number of updates for which the other cameras are initially assumed not to have seen the
+worker."""
 
 
 @kernel(makes_arrays=True)
@@ -52,7 +53,7 @@ def start_from_one_view(
     work: Work,
     prior: Records1[Tree],
 ) -> None:
-    """Start a track from one view if there was no second view for `one_view_wait_updates`.
+    """Start a track from one view after `one_view_wait_updates` updates without a second view.
 
     Args:
         worker: the hypotheses about a worker without a track, changed in place.
@@ -124,7 +125,7 @@ def _stand_body(tree: Tree, frame: Frame, camera: int, angle: float) -> bool:
         angle: heading of the body [rad].
 
     Returns:
-        Whether there is such a position.
+        Whether such a position exists.
     """
     P, cos, sin = frame.P[camera], math.cos(angle), math.sin(angle)
     views, place = np.empty((len(STANDING_M), 3, 4)), np.empty(3)

@@ -7,9 +7,9 @@ rotations w_a, w_b of the cameras about their centres change the gap to
 
     g + r_b (d_b x n) . w_b - r_a (d_a x n) . w_a.
 
-Every joint of a body is a measurement that this gap is 0. The rotations are a Gaussian of 6
-numbers that starts at zero and forgets within seconds. The remaining uncertainty of a displacement
-of the whole body is added to the reported covariance.
+Every joint of a body is a measurement that this gap is 0. The rotations are estimated as a Gaussian
+of 6 numbers, with mean zero initially and with a memory of a few seconds. The remaining uncertainty
+of a displacement of the whole body is added to the reported covariance.
 """
 
 import math
@@ -31,16 +31,16 @@ TURN_STD_RAD = 0.05
 """Prior standard deviation of a camera's rotation about each axis [rad], an estimate for a camera
 that was knocked."""
 _LEAST_TURN_RAD = 0.014
-"""Combined rotation of both cameras above which they become misaligned [rad]; half of it suffices
-for them to remain so."""
+"""Combined rotation of both cameras above which they are considered misaligned [rad]. Misaligned
+cameras remain so above half of this value."""
 _LEAST_EVIDENCE = 16.0
-"""Twice the log-likelihood that the rotations must explain before cameras become misaligned; half
-of it suffices for them to remain so."""
+"""Twice the gain in log-likelihood from the rotations above which cameras are considered
+misaligned. Misaligned cameras remain so above half of this value."""
 _MOST_TURN_RAD = 0.14
-"""Combined rotation from which the lines of sight are assumed to belong to different people
+"""Combined rotation above which the lines of sight are assumed to belong to different people
 [rad]."""
 _MEETING = 3.0
-"""Median squared gap, in variances, below which the lines of sight of a body meet."""
+"""Median squared gap, divided by its variance, below which the lines of sight of a body meet."""
 _FORGETS = 0.1
 """Weight of one update in `Pair.meeting_share`."""
 _LEAST_SHARE = 0.5
@@ -49,13 +49,14 @@ _LEAST_SHARE_MISALIGNED = 0.3
 """Value of `Pair.meeting_share` above which cameras may remain misaligned; also its initial
 value."""
 _KEPT = 0.99
-"""Share of the information that is kept in an update."""
+"""Fraction of the information that is retained in an update."""
 _WEIGHT = 1 / 12
-"""Weight of an update, because errors of a detector persist for about twelve updates."""
+"""Weight of an update. It is below 1 because errors of a detector persist for about twelve
+updates."""
 _PASSING_M = 0.03
-"""Standard deviation of the gap between two lines of sight apart from pixel noise [m]."""
+"""Standard deviation of the gap between two lines of sight that is not due to pixel noise [m]."""
 _TAIL = 4.0
-"""Squared gap with half its weight, relative to the median."""
+"""Squared gap, relative to the median, at which a gap has half its weight."""
 
 
 @kernel(makes_arrays=True)
@@ -100,8 +101,8 @@ def check_pair_calibration(worker: WorkerHypotheses, frame: Frame, settings: Set
 def _may_start_turned(tree: Tree, cameras: Records1[Camera], settings: Settings) -> bool:
     """Return whether a track may start with two rotated cameras.
 
-    An existing track is kept if the rotations leave the position of the body too uncertain, as
-    those of almost opposite cameras do.
+    An existing track is kept if the rotations leave the position of the body too uncertain, which
+    is the case if the cameras are almost opposite each other.
 
     Args:
         tree: the worker's heaviest hypothesis; its `displaced_m2` is overwritten.

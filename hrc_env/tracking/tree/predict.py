@@ -31,23 +31,25 @@ from hrc_env.tracking.tree.state import Tree, Work
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # _LEFT is parent of _RIGHT, _LEFT_HIP
 _REORDER = {"reassoc", "contract", "nsz"}
 _UPRIGHT_COSINE = math.cos(math.radians(25.0))
-"""Cosine of the largest angle from the vertical of an upright trunk (an estimate)."""
+"""Cosine of the largest angle from the vertical of an upright trunk. The angle is an estimate."""
 _LYING_COSINE = math.cos(math.radians(50.0))
-"""Cosine of the smallest angle from the vertical of a lying trunk (an estimate)."""
+"""Cosine of the smallest angle from the vertical of a lying trunk. The angle is an estimate."""
 _SHORT_M = 0.05
-"""Minimum length of the right-to-left vector for a heading [m]."""
+"""Minimum length of the right-to-left vector from which a heading is computed [m]."""
 _KNEE, _FOOT = JOINT["left_knee"], JOINT["left_foot"]
 SPREAD_M: Floats = np.array(
     [0.06, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.22, 0.22]
 )
-"""(J,) standard deviation of a joint about its mean position on the body [m] (an estimate)."""
+"""(J,) standard deviation of a joint about its mean position on the body [m]. The values are
+estimates."""
 SPEED_M_S: Floats = np.array(
     [0.2, 0.2, 0.2, 0.5, 0.5, 0.95, 0.95, 0.2, 0.2, 0.5, 0.5, 0.9, 0.9, 0.95, 0.95]
 )
-"""(J,) standard deviation of a joint's speed relative to the body [m/s]. The values are an estimate
-for people at work; with doubled values, predicted standard deviations would be twice the errors."""
+"""(J,) standard deviation of a joint's speed relative to the body [m/s]. The values are estimates
+for people at work. With doubled values, the predicted standard deviations would be twice the
+errors."""
 _OFFSET_TAU_S = 2.0
-"""Time constant with which mean positions on the body are forgotten [s]."""
+"""Time constant of the averages of joints' positions on the body [s]."""
 _OFFSET_STD_M = 0.06
 """Standard deviation of a joint's position above which its offset is not learnt [m]."""
 
@@ -78,24 +80,24 @@ class TorsoState(NamedTuple):
     """Mean position and velocity of the four torso joints in the world frame."""
 
     x: float
-    """First coordinate [m]."""
+    """Coordinate x [m]."""
     y: float
-    """Second coordinate [m]."""
+    """Coordinate y [m]."""
     z: float
-    """Height [m]."""
+    """Coordinate z, the height [m]."""
     vx: float
-    """Velocity along the first axis [m/s]."""
+    """Velocity along x [m/s]."""
     vy: float
-    """Velocity along the second axis [m/s]."""
+    """Velocity along y [m/s]."""
     vz: float
-    """Upward velocity [m/s]."""
+    """Velocity along z, upwards [m/s]."""
 
 
 class Lean(NamedTuple):
-    """The attitude of a trunk."""
+    """Degree and direction of a trunk's lean."""
 
     share: float
-    """Degree of lying, from 0 for an upright trunk to 1 for a lying one."""
+    """Degree of the lean, from 0 for an upright trunk to 1 for a lying trunk."""
     direction: Vector3
     """Unit vector from the hips to the shoulders in the world frame."""
 
@@ -227,7 +229,7 @@ def _move_covariance(
     """Compute the covariance of joints `j` and `m` after a time step, without noise.
 
     With the transitions f, d of joint j and of its anchor, and g, e of joint m and of its anchor,
-    applied on each axis, it is f cov g' + f own e' + d other' g' + d torso e'.
+    applied on each axis, the covariance is f cov g' + f own e' + d other' g' + d torso e'.
 
     Args:
         own: (6, 6) covariance of joint `j` with the torso's mean.
@@ -277,7 +279,7 @@ def measure_lean(body: Floats) -> Lean:
 
 @kernel
 def choose_axes(j: int) -> int:
-    """Return the index of the axes with which joint `j` moves: 0 for the trunk, 1 for the legs."""
+    """Return the index of the axes for joint `j`: 0 for trunk, head and arms, 1 for the legs."""
     return 1 if j >= _KNEE else 0
 
 
@@ -306,7 +308,7 @@ def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bo
 
 @kernel
 def _complete_axes(body: Floats, axes: Floats) -> bool:
-    """Complete axes (3, 3) from the last column, up; return whether the body's left is known."""
+    """Complete axes (3, 3) given the last column, up; return whether the body's left is known."""
     length = along = across = 0.0
     for i in range(3):
         axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
@@ -349,37 +351,49 @@ def _are_legs_along_trunk(body: Floats, root: TorsoState, offset: Floats, axes: 
 
 @functools.lru_cache(maxsize=16)
 def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> JointMotion:
-    """Return the exact discretisation of damped joints over a time step.
+    """Return the exact motion of underdamped joints over a time step.
+
+    On each axis, the displacement of a joint from its anchor is a damped oscillator driven by white
+    noise. Its stationary standard deviations are `SPREAD_M` for the displacement and `SPEED_M_S`
+    for its rate of change, which determine the natural frequency.
 
     Args:
         dt_s: the time step [s].
-        damping: damping ratio, in (0, 1).
-        root_acceleration: spectral density of the whole body's acceleration [m^2/s^3].
+        damping: damping ratio of the oscillators, in (0, 1).
+        root_acceleration: spectral density of the acceleration of the whole body [m^2/s^3].
 
     Returns:
-        The transition relative to the anchor, and process noise that maintains the stationary
-        variances and adds the acceleration of the whole body.
+        (J, 2, 2) transition matrices of displacement and velocity, and (J, 2, 2) covariances of the
+        process noise. The noise is the sum of two parts: the noise of the oscillators, which keeps
+        their variances stationary, and the noise from `make_shared_noise`.
     """
-    frequency = SPEED_M_S / SPREAD_M
-    damped = frequency * np.sqrt(1 - damping**2)
-    decay, cos, sin = (
-        np.exp(-damping * frequency * dt_s),
-        np.cos(damped * dt_s),
-        np.sin(damped * dt_s),
-    )
-    slope = damping * frequency / damped * sin
-    F = np.empty((len(frequency), 2, 2))
-    F[:, 0, 0], F[:, 0, 1] = decay * (cos + slope), decay * sin / damped
-    F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
-    stationary = np.zeros_like(F)
-    stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
-    noise = stationary - F @ stationary @ F.swapaxes(1, 2)
-    noise += make_shared_noise(dt_s, root_acceleration)
-    return JointMotion(F, noise)
+    natural_rad_s = SPEED_M_S / SPREAD_M  # (J,) undamped angular frequencies
+    damped_rad_s = natural_rad_s * np.sqrt(1 - damping**2)  # (J,)
+    decay = np.exp(-damping * natural_rad_s * dt_s)  # (J,) decrease of the amplitudes
+    cos = np.cos(damped_rad_s * dt_s)
+    sin = np.sin(damped_rad_s * dt_s)
+    damped_sin = damping * natural_rad_s / damped_rad_s * sin
+
+    F = np.empty((len(natural_rad_s), 2, 2))  # both axes are ordered displacement, velocity
+    F[:, 0, 0] = decay * (cos + damped_sin)
+    F[:, 0, 1] = decay * sin / damped_rad_s
+    F[:, 1, 0] = -decay * natural_rad_s**2 / damped_rad_s * sin
+    F[:, 1, 1] = decay * (cos - damped_sin)
+
+    stationary = np.zeros_like(F)  # (J, 2, 2) stationary covariances, F S F' + Q = S
+    stationary[:, 0, 0] = SPREAD_M**2
+    stationary[:, 1, 1] = SPEED_M_S**2
+    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
+    Q += make_shared_noise(dt_s, root_acceleration)
+    return JointMotion(F, Q)
 
 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
-    """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s]."""
+    """Return the covariance (2, 2) of the process noise that all joints share over `dt_s` [s].
+
+    It is the covariance of position and velocity on one axis if the acceleration of the whole body
+    is white noise with the spectral density `root_acceleration` [m^2/s^3].
+    """
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 

@@ -1,9 +1,9 @@
-"""Moments of the mixture of a worker's hypotheses, with wider covariances for single views.
+"""Moments of the mixture of a worker's hypotheses, with covariances increased for single views.
 
 The motion model describes people who walk and work. With one view, the errors for a person that
 spins, falls or runs exceed the Gaussian's standard deviations, because the depths of joints follow
-from the orientation of the body, which is then recognised late. `find_pace_factor` returns the
-factor on the covariance that accounts for this.
+from the orientation of the body, and fast changes of orientation are recognised late.
+`find_pace_factor` returns the factor on the covariance that accounts for this.
 """
 
 import math
@@ -18,11 +18,12 @@ from hrc_env.tracking.tree.predict import measure_lean, measure_torso, measure_t
 from hrc_env.tracking.tree.state import Hypotheses, Pace, Tree, WorkerHypotheses
 
 _FORGOTTEN_UPDATES = 8
-"""Number of updates without the worker after which a camera no longer counts as a view."""
+"""Number of updates without a detection of the worker after which a camera no longer counts as a
+view."""
 _TAU_S = 0.7
 """Time constant of the averages in `Pace` [s]."""
 _MOST_RATE = 15.0
-"""Upper bound of every rate [rad/s] or [m/s], which no person exceeds."""
+"""Upper bound of every rate [rad/s] or [m/s]. No person exceeds it."""
 
 
 class Excess(NamedTuple):
@@ -38,13 +39,13 @@ _TURN = Excess(2.3, 1.1)
 """Parameters for rotation about the vertical. Like `_TIP` and `_SPEED`, they were fitted to people
 walking, spinning, falling, tumbling and running."""
 _TIP = Excess(0.52, 5.0)
-"""Parameters for tilting of the trunk."""
+"""Parameters for the rate at which the trunk tilts."""
 _SPEED = Excess(1.63, 1.1)
 """Parameters for the speed of the trunk."""
 MOST_MOVING = 10.5
-"""Upper bound of the factor for movement."""
+"""Upper bound of the factor on the covariance for movement."""
 _MOST = 25.0
-"""Upper bound of the combined factor for movement and a lying body."""
+"""Upper bound of the combined factor on the covariance for movement and a lying body."""
 
 
 @kernel(makes_arrays=True)
@@ -80,7 +81,7 @@ def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> 
 
 @kernel
 def _mix(trees: Records1[Tree], n: int, mean: Floats, cov: Floats, velocity: Floats) -> None:
-    """Compute the moments of a mixture.
+    """Compute the moments of the mixture of a worker's hypotheses.
 
     Args:
         trees: (H,) hypotheses about one worker.
@@ -115,7 +116,7 @@ def measure_pace(worker: WorkerHypotheses) -> None:
 
 @kernel
 def update_pace(pace: Pace, body: Floats, dt: float) -> None:
-    """Update the averages of a pace with a body (J, 6), `dt` [s] after the last one."""
+    """Update the averages of a pace with a body (J, 6), `dt` [s] after the last update."""
     ax, ay = _measure_width(body, 0), _measure_width(body, 1)
     ux, uy, uz = measure_trunk(body, 0), measure_trunk(body, 1), measure_trunk(body, 2)
     flat, length = math.hypot(ax, ay) + 1e-9, math.sqrt(ux * ux + uy * uy + uz * uz) + 1e-9
@@ -154,7 +155,7 @@ def find_pace_factor(pace: Pace) -> float:
 
 @kernel
 def _fade(mean: float, rate: float, keep: float) -> float:
-    """Return an exponential moving average after another rate, with the weight 1 - `keep`."""
+    """Return an exponential moving average updated with a rate, which has the weight 1 - `keep`."""
     return keep * mean + (1.0 - keep) * min(rate, _MOST_RATE)
 
 

@@ -1,9 +1,9 @@
 """Search for the most probable positions of a body, given its prediction and one set of frames.
 
-The search is a robust Gauss-Newton method on the positions of the tree. Measurements of cameras
-concern single joints, and bone lengths concern edges of the tree. The likelihood of a pixel is the
-mixture of a Gaussian about the joint's image and, with the outlier weight, a uniform density over
-the image. At first, the Gaussian is widened by the uncertainty of the prediction, so that good
+The search is a robust Gauss-Newton method on the positions of the tree. Each camera measurement
+depends on a single joint, and each bone length on an edge of the tree. The likelihood of a pixel is
+the mixture of a Gaussian about the joint's image and, with the outlier weight, a uniform density
+over the image. At first, the Gaussian is widened by the uncertainty of the prediction, so that good
 measurements of a badly predicted joint are not mistaken for outliers (graduated non-convexity).
 Each step solves one 45x45 system exactly by elimination from the leaves to the root and back
 substitution.
@@ -166,7 +166,7 @@ def _linearise_cameras(
 def _add_floor(body: Floats, information: float, work: Work) -> None:
     """Add a measurement of height 0 to joints below the floor.
 
-    It bounds the distance of a body, which is uncertain in one view.
+    The measurement bounds the distance of a body from the camera, which is uncertain in one view.
 
     Args:
         body: (J, 6) predicted means.

@@ -26,7 +26,7 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ROOT
 
 LANES = 16
-"""Number of columns of the arrays of `search`: one for each joint, and one for padding."""
+"""Number of columns of the arrays in `search`: one for each joint and one for padding."""
 N_POINT = 9
 """Number of rows of `Work.points`: x, y, z [m], and entries 00, 11, 22, 01, 02, 12 of the predicted
 position covariance [m^2]."""
@@ -34,9 +34,9 @@ N_VIEW = 3
 """Number of rows of `Frame.views`: u, v [px] and precision [1/px^2]; all 0 without a
 measurement."""
 N_IMAGE = 12
-"""Number of rows of `Work.image`: weight of the measurement, 0 to 1; logarithm of the Gaussian in
-its odds of being an inlier, and the remaining factor; Jacobians of u and of v [px/m]; residuals
-[px]; reciprocal of the depth [1/m], 0 for a joint without a usable pixel."""
+"""Number of rows of `Work.image`: weight of the measurement, 0 to 1; logarithm of the Gaussian
+factor of its inlier odds, and the other factor of these odds; Jacobians of u and of v [px/m];
+residuals [px]; reciprocal of the depth [1/m], which is 0 for a joint without a usable pixel."""
 N_SUM = 9
 """Number of rows of `Work.sums`: entries 00, 11, 22, 01, 02, 12 of the information [1/m^2], and the
 gradient [1/m]."""
@@ -55,17 +55,16 @@ STANDING_M: Floats = np.array(
 """(J, 3) joints of a standing adult relative to the centre of the torso, forward, left and up
 [m]."""
 STANDING_COUNT = 5.0
-"""Number of updates to which the offsets of the standing body correspond when offsets are learnt.
-"""
+"""Weight of the standing body's offsets when offsets are learnt, as a number of updates."""
 N_SUMS = 5
 """Length of `Noise.sums`."""
 SQUARES, REDUNDANCY, PRODUCTS, LAST_SQUARES, TURN = range(N_SUMS)
-"""Entries of `Noise.sums`: exponentially fading sums of the squared residuals, of their redundancy,
-of their products with the previous residuals, and of the squared previous residuals. The last entry
-is used for the first joint and camera only; it is the index of the group of joints whose noise is
-learnt in the next update."""
+"""Indices of the entries of `Noise.sums`: exponentially weighted sums of the squared residuals, of
+their redundancy, of their products with the previous residuals, and of the squared previous
+residuals. The last entry is used for the first joint and camera only; it is the index of the group
+of joints whose noise is learnt in the next update."""
 POPULATION_SHARE = 0.10
-"""Standard deviation of a bone's length among people, relative to that length."""
+"""Standard deviation of a bone's length in the population, relative to the mean length."""
 STIFFNESS_M: Floats = np.where(np.any(JOINT["nose"] == BONES, axis=-1), 0.05, 0.02)
 """Standard deviation of each distance of `skeleton.BONES` within one person [m]; it is larger for
 distances from the nose, because the head moves relative to the shoulders."""
@@ -83,7 +82,8 @@ class Pair:
     cameras: Annotated[Ints, (2,)]
     """Indices of the two cameras."""
     information: Annotated[Floats, (6, 6)]
-    """Fading information about the rotations from the gaps between lines of sight [1/rad^2]."""
+    """Exponentially weighted information about the rotations from the gaps between lines of sight
+    [1/rad^2]."""
     score: Annotated[Floats, (6,)]
     """Product of `information` and the rotations that the gaps alone indicate [1/rad]."""
     turn: Annotated[Floats, (6,)]
@@ -91,7 +91,8 @@ class Pair:
     turn_cov: Annotated[Floats, (6, 6)]
     """Covariance of the two rotation vectors [rad^2]."""
     meeting_share: float
-    """Fading share of updates in which the lines of sight of most joints met."""
+    """Exponentially weighted fraction of the updates in which the lines of sight of most joints
+    met."""
     is_misaligned: bool
     """Whether the cameras are considered rotated relative to their calibration."""
     untracked_updates: int
@@ -130,7 +131,7 @@ class Tree:
     """Mean position of each joint relative to the centre of the torso, along the body's axes
     forward, left and up [m]."""
     offset_count: Annotated[Floats, (_J,)]
-    """Number of updates from which the joint's offset was learnt."""
+    """Number of updates in which the joint's offset was learnt, plus `STANDING_COUNT`."""
     bone_length: Annotated[Floats, (_J,)]
     """Distance from each joint to its parent [m]."""
     bone_variance: Annotated[Floats, (_J,)]
@@ -175,7 +176,7 @@ class Pace:
     since_s: float
     """Time since the last update [s]."""
     is_known: bool
-    """Whether there has been an update since the track started."""
+    """Whether the pace has been updated since the track started."""
     turn_rad_s: float
     """Exponential moving average of the rate of rotation about the vertical [rad/s]."""
     tip_rad_s: float
@@ -218,7 +219,7 @@ class Work:
     inverse: Annotated[Floats, (_J, 6, 6)]
     """Inverse Hessian of each joint given its parent."""
     step: Annotated[Floats, (_J, 6)]
-    """Change of the means."""
+    """Change of the means in position and velocity."""
     gradient: Annotated[Floats, (_J, 6)]
     """Gradient of the log-likelihood with respect to the means."""
     position_precision: Annotated[Floats, (_J, 3, 3)]

@@ -1,9 +1,9 @@
 """Update of a tree by one set of frames, as an exact linear-Gaussian update about the mode.
 
-Measurements of cameras concern single joints, and bone lengths concern edges. Therefore the
-posterior is a Gaussian on the same tree: elimination from the leaves to the root and back
-substitution compute its marginals and slopes. The estimate is then shifted from the mode to the
-mean.
+Each camera measurement depends on a single joint, and each bone length on an edge of the tree.
+Therefore the posterior is a Gaussian on the same tree: elimination from the leaves to the root and
+back substitution compute its marginals and slopes. The estimate is then shifted from the mode to
+the mean.
 
 If several views agree with each other but not with the prediction, the predicted covariance was too
 small, for example because a person jerked a limb or rolled over. In this case, the conditional part
@@ -36,13 +36,13 @@ from hrc_env.tracking.tree.search import A0, A1, A2, B0, B1, B2, NEARNESS, find_
 from hrc_env.tracking.tree.state import Tree, Work
 
 _FAR = 16.0
-"""Squared Mahalanobis distance above which a joint is considered to have jumped; by chance, a joint
-exceeds it once in 900 updates."""
+"""Squared Mahalanobis distance above which a joint is considered to have jumped. By chance, a joint
+exceeds this distance once in 900 updates."""
 _SURE_VIEWS = 1.5
 """Sum of a joint's inlier probabilities above which its position in the found pose is trusted."""
 _AGREEING_VIEWS = 3
-"""Number of views that must agree on a joint's position otherwise, because two may have the same
-error."""
+"""Minimum number of views that agree on a triangulated position for it to be trusted otherwise. Two
+views may have the same error."""
 _NEAREST_M = 0.3
 """Lower bound of a joint's depth in the correction of the mean [m]."""
 _REORDER = {"reassoc", "contract", "nsz"}
@@ -126,18 +126,19 @@ def _find_jump(
 ) -> bool:
     """Return whether cameras agree on a position of a joint far from the predicted one.
 
-    If the fitted pose is supported by enough cameras, its position counts. If not, they may agree
-    on another one, which is triangulated: its covariance and the prediction's are added.
+    If enough cameras support the joint's position in the fitted pose, that position is used.
+    Otherwise, the position on which the cameras agree, if any, is triangulated, and its covariance
+    is added to that of the prediction.
 
     Args:
         j: index of the joint.
         tree: the predicted hypothesis, in the world frame.
-        frame: the measurements, with the weights `belief` (J, C) as `find_pose` leaves them.
+        frame: the measurements, with the weights `belief` (J, C) computed by `find_pose`.
         settings: settings of the estimator.
         work: `point` (J, 3) is the fitted pose [m]; the matrix `c` is overwritten.
-        point: (3,) receives the position [m]; meaningless if False is returned.
-        spread: (3, 3) scratch for the covariance of a triangulated position [m^2].
-        use: (C,) scratch for the cameras that agree.
+        point: (3,) the position [m], filled in; undefined if False is returned.
+        spread: (3, 3) work array for the covariance of a triangulated position [m^2].
+        use: (C,) work array for the mask of the cameras that agree.
     """
     ok, predicted, predicted_cov = frame.ok[j], tree.body[j], tree.cov[j]
     scratch = work.c
@@ -346,12 +347,12 @@ def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
     farther behind the mode than in front of it. With the Jacobian J of joint j's pixel and the
     camera's optical axis n (both in the world frame), the depth d and the posterior covariance S_j,
     mean - mode = H^-1 g, where g_j is the sum of n tr(S_j J'J / sigma^2) / d over cameras. H is the
-    Hessian of all joints, of which `update_tree` has left the factors in `work`.
+    Hessian of all joints; `update_tree` has stored its factors in `work`.
 
     Args:
         tree: the updated hypothesis, changed in place.
         frame: the measurements, with inlier probabilities and images.
-        share: share of the shift that is applied, 0 to 1.
+        share: fraction of the shift that is applied, 0 to 1.
         work: work arrays with the results of `update_tree`.
     """
     sigma, ok, belief = frame.sigma, frame.ok, frame.belief
@@ -413,9 +414,9 @@ def correct_mean(tree: Tree, frame: Frame, settings: Settings, work: Work) -> No
 def count_conflict(n_ok: int, n_supporting: int, conflict: int) -> int:
     """Return the number of successive updates in which views contradict the estimate of a joint.
 
-    It increases if at least two cameras measured the joint and at most one of them supports the
-    estimate. It is reset to 0 if at least two cameras support the estimate or no camera measured
-    the joint, and does not change if a single camera measured the joint.
+    The number increases if at least two cameras measured the joint and at most one of them supports
+    the estimate. It is reset to 0 if at least two cameras support the estimate or no camera
+    measured the joint, and does not change if a single camera measured the joint.
 
     Args:
         n_ok: number of cameras that measured the joint.

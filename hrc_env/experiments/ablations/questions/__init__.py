@@ -1,1 +1,1 @@
-"""The questions of the ablations: rigs, faults of cameras, and estimators."""
+"""Declarations of the ablations: rigs, faults of cameras, and estimators."""

@@ -10,7 +10,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 LATE_MS = (40, 80, 120, 200, 320)
-"""Latencies of images [ms], which are multiples of the control step (320 instead of 300)."""
+"""Latencies of images [ms]. They are multiples of the control step, hence 320 instead of 300."""
 LATENCY = Ablation(
     "latency",
     "How late may images be?",
@@ -34,7 +34,7 @@ LATENCY = Ablation(
 
 
 class Miscalibration(NamedTuple):
-    """A kind of calibration error, and its amounts."""
+    """A kind of calibration error, with the amounts to compare."""
 
     words: str
     """Description of the error in tables."""
@@ -43,9 +43,10 @@ class Miscalibration(NamedTuple):
     short: str
     """Unit of amounts in names of settings."""
     scale: float
-    """Amount of the fault that corresponds to one unit."""
+    """Amount of the fault, in the units of `FaultConfig`, that corresponds to one unit in
+    tables."""
     amounts: tuple[float, ...]
-    """Amounts in the unit of tables."""
+    """Amounts to compare, in the unit of tables."""
 
 
 KINDS = {
@@ -55,7 +56,7 @@ KINDS = {
 }
 """Kinds of calibration errors by the name of their fault."""
 AFFECTED = {"one": "one camera", "all": "all cameras"}
-"""Labels of the affected cameras."""
+"""Descriptions of the choices of miscalibrated cameras, by name."""
 
 
 def _miscalibrate(affected: str, name: str, amount: float, scene: str = "lab") -> Setting:

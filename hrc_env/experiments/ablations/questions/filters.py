@@ -1,4 +1,4 @@
-"""Ablations of Algorithm 1, of the parts of the default filter, and of its model of the body."""
+"""Ablations of Algorithm 1, of the parts of the default filter, and of its body model."""
 
 import math
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ class Variant(NamedTuple):
     words: str
     """Description of the variant in tables."""
     changes: dict[str, Any]
-    """Changed fields of `Setting` or of the tracker's settings."""
+    """Values that differ from the default, by field of `Setting` or of `TrackerConfig`."""
 
 
 WITHOUT = {
@@ -72,16 +72,16 @@ OF_ONE_VIEW = (
     "no widening", "one hypothesis", "no turned body", "no limbs", "no anatomy",
     "no walking direction", "evidence in full", "4 hypotheses", "16 hypotheses",
 )  # fmt: skip
-"""Variants that differ from the default filter only with one camera."""
+"""Names of the variants that differ from the default filter only if a single camera works."""
 
 
 class CameraChoice(NamedTuple):
-    """A number of cameras, and the rigs over which episodes rotate."""
+    """A number of working cameras, with the rigs that successive episodes use in turn."""
 
     words: str
-    """Description of the choice in tables."""
+    """Description of the choice of cameras in tables."""
     rigs: tuple[Rig, ...]
-    """Cameras that work after the warm-up."""
+    """Rigs of the cameras that work after the warm-up."""
 
 
 CAMERAS = {
@@ -93,7 +93,7 @@ CAMERAS = {
 
 
 def _make_variant(cameras: str, name: str) -> Setting:
-    """Return the setting of a variant of the filter with a choice of cameras."""
+    """Return the setting of a filter variant with a choice of cameras."""
     choice, variant = CAMERAS[cameras], WITHOUT[name]
     of_setting = {k: value for k, value in variant.changes.items() if k in Setting.__slots__}
     of_tracker = {k: value for k, value in variant.changes.items() if k not in of_setting}
@@ -121,13 +121,13 @@ FILTER = Ablation(
 
 
 class BodyKnowledge(NamedTuple):
-    """An estimator and its knowledge of bone lengths."""
+    """An estimator with a treatment of bone lengths."""
 
     words: str
     """Description of the estimator in tables."""
     estimator: str
     bones: str
-    """One of `handicaps.BONES`."""
+    """Treatment of bone lengths, one of `handicaps.BONES`."""
 
 
 KNOWING = {
@@ -136,7 +136,7 @@ KNOWING = {
     "none": BodyKnowledge("bones of any length", "particle", "none"),
     "points": BodyKnowledge("points without a body (ransac)", "ransac", "learnt"),
 }
-"""Kinds of knowledge of the body, by name."""
+"""Estimators with their treatments of bone lengths, by name."""
 KINEMATICS = Ablation(
     "kinematics",
     "Effect of a model of the body",

@@ -22,29 +22,29 @@ UNDER_CEILING_M, BREAST_M = 2.45, 1.0
 BESIDE_M = 0.5
 """Distance between two cameras that are next to each other [m]."""
 Place = tuple[float, float]
-"""Position x, y of a camera [m]."""
+"""Horizontal position (x, y) of a camera [m]."""
 CORNERS: tuple[Place, ...] = ((X_M, Y_M), (-X_M, Y_M), (-X_M, -Y_M), (X_M, -Y_M))
 WALLS: tuple[Place, ...] = ((0.0, Y_M), (-X_M, 0.0), (0.0, -Y_M), (X_M, 0.0))
 ROUND = tuple(place for pair in zip(CORNERS, WALLS, strict=True) for place in pair)
 """Eight positions around the room, alternating between corners and centres of walls."""
 PAIRS: tuple[Rig, ...] = (NEIGHBOURS[0], OPPOSITE[0], NEIGHBOURS[1], OPPOSITE[1])
-"""Two pairs of opposite and two of neighbouring cameras, so that no result depends on one
-arrangement."""
+"""Pairs of cameras: two pairs of opposite and two of neighbouring ones. Results therefore do not
+depend on one arrangement."""
 
 
 def make_cameras(
     places: tuple[Place, ...], height_m: float = UNDER_CEILING_M
 ) -> tuple[CameraConfig, ...]:
-    """Return cameras at the given positions and height, which are aimed at the shared space."""
+    """Return cameras at the given positions and height, aimed at the shared workspace."""
     numbered = enumerate(places, 1)
     return tuple(CameraConfig(f"place_{k}", (x, y, height_m)) for k, (x, y) in numbered)
 
 
 def spread_cameras(n_cameras: int) -> tuple[Turn, ...]:
-    """Return all rigs at some of the eight positions, spread around the room as evenly as possible.
+    """Return all rigs of `n_cameras` at the eight positions, spread as evenly as possible.
 
-    A single camera is one of four in the corners or on the walls, of which the others fail after
-    the warm-up.
+    A single camera is one of four in the corners or on the walls; the other three fail after the
+    warm-up.
     """
     if n_cameras == 1:
         return tuple(
@@ -67,13 +67,13 @@ def place_along_walls() -> tuple[Turn, ...]:
 
 
 def place_side_by_side() -> tuple[Turn, ...]:
-    """Return rigs of two cameras side by side along a wall, one rig for each corner of the room."""
+    """Return rigs of two adjacent cameras along a wall, one rig for each corner of the room."""
     pairs = (((x, y), (x - BESIDE_M * (1 if x > 0 else -1), y)) for x, y in CORNERS)
     return tuple(Turn(make_cameras(pair)) for pair in pairs)
 
 
 def _select_corners(rigs: tuple[Rig, ...]) -> tuple[Turn, ...]:
-    """Return one turn with cameras in the given corners for each rig."""
+    """Return a turn for each rig, in which the cameras in the given corners work."""
     return tuple(Turn(make_cameras(tuple(CORNERS[c] for c in rig))) for rig in rigs)
 
 
