@@ -46,7 +46,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "export": (
         "hrc_env.cli.export", "Export",
-        "Export a run's policy and a model card with its scores; loading the file executes no code.",
+        "Export a run's policy and a model card with its scores; loading the file executes no "
+        "code.",
     ),
     "record": (
         "hrc_env.cli.record", "Record",
