@@ -378,7 +378,7 @@ def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
 
 
 def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
-    """Return the appearance in options; None without the option."""
+    """Return the appearance that the options specify, or None if they specify none."""
     if "appearance" not in given:
         return None
     appearance: AppearanceConfig = convert_to_hint(

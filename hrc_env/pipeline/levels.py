@@ -100,7 +100,7 @@ def make_pipeline(
 
 @dataclass(frozen=True, slots=True)
 class PipelineOfEpisode:
-    """A factory of pipelines for single environments with different cameras in their episodes."""
+    """Factory of pipelines for single environments with cameras that vary between episodes."""
 
     level: str
     """Perception level."""

@@ -91,7 +91,7 @@ def mark_solids(solids: tuple[Solids, ...]) -> Marks:
 
 
 def mark_points(points_world: Points3, camera: PinholeCamera) -> Marks:
-    """Return spheres around points (M, 3) [m] as marks of a camera's picture."""
+    """Return sphere markers centred on the points (M, 3) [m], for a camera's picture."""
     depth_m = (points_world - camera.eye_world) @ camera.T_world_from_cam[:3, 2]
     radius_m = np.maximum(MARKER_M, MARKER_PX * depth_m / camera.K[0, 0])
     rgb = np.tile(np.array(overlay.GOAL) / 255, (len(points_world), 1))

@@ -61,7 +61,7 @@ MEASURED = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsu
 
 
 def assets_dir() -> Path:
-    """Return the path of the assets folder, in a checkout a link to the folder `assets/`."""
+    """Return the path of the assets folder, which is a link to `assets/` in a checkout."""
     return Path(__file__).parents[1] / "assets"
 
 
