@@ -73,7 +73,7 @@ REFUSED = {
         for name in (*REQUIRED, "markers", "is_terminal")
     },
     "a former name": (vary(REACH, over=lambda self, step: True), "over is called is_terminal now"),
-    "nearly a hook": (vary(REACH, is_terminl=lambda self, step: True), "Is is_terminal meant"),
+    "nearly a hook": (vary(REACH, is_terminl=lambda self, step: True), "Did you mean is_terminal"),
     "other arguments": (vary(REACH, view=lambda self, state: None), "view must be a method of"),
     "an object of a task": (REACH(), "register the class Reach itself"),
     "terms in a list": (vary(REACH, rewards=[]), "rewards must be a tuple of RewardTerm"),
@@ -83,10 +83,10 @@ REFUSED = {
         vary(REACH, config_type=make_dataclass("Own", ["x"])), "needs a default"),
     "an observation twice": (
         vary(REACH, observations=(*REACH.observations, SHARED_TERMS[0])),
-        f"term {SHARED_TERMS[0].name!r} already"),
+        f"term {SHARED_TERMS[0].name!r} exists already"),
     "a reward twice": (
         vary(REACH, rewards=(*REACH.rewards, SHARED_REWARDS[-1])),
-        f"term {SHARED_REWARDS[-1].name!r} already"),
+        f"term {SHARED_REWARDS[-1].name!r} exists already"),
     "another goal": (
         vary(WITH_GOAL, goal=SimpleNamespace(doc="near")), "goal must be a Goal, got Simple"),
     "a state that is a list": (
