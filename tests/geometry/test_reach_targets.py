@@ -43,7 +43,7 @@ def test_it_depends_on_where_the_tool_points(x_m, along, fits):
 
 
 def test_goals_too_far_away_are_refused():
-    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like', .* closer"
+    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like': .* closer"
     for task in ("HRCReach-v0", "HRCReachGoal-v0"):
         with pytest.raises(ConfigError, match=said):
             gymnasium.make(task, perception="none", config={"task": {"distance_m": (2.0, 2.5)}})
