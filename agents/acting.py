@@ -84,14 +84,13 @@ def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size
     made_with = meta["hrc_env"]
     if made_with.split(".")[:2] != __version__.split(".")[:2]:
         raise CheckpointError(
-            f"{path} was made with hrc_env {made_with}, this is {__version__}; checkpoints fit the "
-            f"same minor version. Install hrc_env {made_with} or train again: {TRAIN}"
+            f"{path} was made with hrc_env {made_with}, but this is {__version__}; checkpoints "
+            f"require the same minor version. Install hrc_env {made_with} or train again: {TRAIN}"
         )
     sizes = meta["observation_size"], meta["action_size"]
     if sizes != (observation, action):
         raise CheckpointError(
-            f"{path} expects observations {sizes[0]} and actions {sizes[1]}, this environment has "
-            f"{observation} and {action}: make it with the same task, robot, "
-            f"n_workers, control and observe_images "
-            f"({meta.get('environment')})."
+            f"{path} expects observations {sizes[0]} and actions {sizes[1]}, but this environment "
+            f"has {observation} and {action}: create it with the same task, robot, n_workers, "
+            f"control and observe_images ({meta.get('environment')})."
         )

@@ -42,7 +42,9 @@ class Ramp:
 
     def __post_init__(self) -> None:
         if self.n_steps < 0:
-            raise ConfigError(f"A ramp takes 0 or more environment steps, got {self.n_steps}.")
+            raise ConfigError(
+                f"The length of a ramp must be 0 or more environment steps, got {self.n_steps}."
+            )
 
     def at(self, n_steps: int) -> float:
         """Return the factor in [0, 1] after a number of environment steps."""
@@ -256,7 +258,7 @@ class Panel(NamedTuple):
 PANELS = {
     "success_rate": Panel("attempts achieved (dashed: episodes with is_success)", "tab:green"),
     "goals_per_minute": Panel("goals per minute", "tab:blue"),
-    "contacts_per_episode": Panel("true contacts per episode", "tab:red"),
+    "contacts_per_episode": Panel("contacts with the true worker per episode", "tab:red"),
     "close_steps_per_episode": Panel("steps < 15 cm per episode", "tab:orange"),
 }
 """Panels in the plot of a learning curve, by metric."""

@@ -71,7 +71,7 @@ def make_expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
     task = ancestor_of(env_info.task, EXPERTS)
     if task not in EXPERTS:
         raise ConfigError(
-            f"There is no scripted agent for {env_info.task}; there is one for "
-            f"{', '.join(EXPERTS)}. The agent 'random' and checkpoints work with every task."
+            f"There is no scripted agent for {env_info.task}, only for {', '.join(EXPERTS)}. The "
+            "agent 'random' and checkpoints work with every task."
         )
     return EXPERTS[task](env_info, yielding)

@@ -56,7 +56,7 @@ def run(request: ExportRequest) -> int:
     arguments = fill_in(read_arguments(request.run_folder))
     path = request.out / arguments.task / f"{request.name}{SUFFIX}"
     if path.exists():
-        raise CheckpointError(f"{path} exists already; give another --name, or delete it.")
+        raise CheckpointError(f"{path} exists already; choose another --name, or delete it.")
     console, kwargs = Console(), arguments.keywords()
     make_ready(console, arguments.perception)
     env = HRCVecEnv(1, **arguments.batched_keywords())
@@ -95,8 +95,8 @@ def extract_network(trained: checkpoints.Learner) -> ExportedNetwork:
     space = trained.observation_space
     if isinstance(space, spaces.Dict) and any(name.startswith(IMAGE) for name in space.spaces):
         raise CheckpointError(
-            "A policy that uses images cannot be exported: such files hold dense layers, no "
-            "convolutions. Use its policy.zip instead."
+            "A policy that uses images cannot be exported: exported files contain only dense "
+            "layers, no convolutions. Use its policy.zip instead."
         )
     policy: Any = trained.policy
     squashed = isinstance(trained, SAC)

@@ -28,9 +28,9 @@ class NearAndFar(BaseFeaturesExtractor):
         parts = observation_space.spaces if isinstance(observation_space, spaces.Dict) else ()
         if images := [name for name in parts if name.startswith(IMAGE)]:
             raise ConfigError(
-                f"This policy uses numbers at two scales, and the observation contains {images}: "
-                "leave out observe_images, or train by PPO without demonstrations, which has a "
-                "policy with convolutions."
+                f"This policy supports no images, but the observation contains {images}: leave out "
+                "observe_images, or train with PPO without demonstrations, whose policy has "
+                "convolutional layers."
             )
         n = spaces.flatdim(observation_space)
         if isinstance(observation_space, spaces.Dict):

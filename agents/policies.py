@@ -113,9 +113,9 @@ def find_path(policy: str) -> Path:
         error = (
             make_unknown_name_error("policy", policy, names)
             if names
-            else "The package has no policies yet."
+            else "The package contains no policies yet."
         )
-        raise ConfigError(f"{error} Or train your own, and: {EXPORT}")
+        raise ConfigError(f"{error} Otherwise, train a policy and export it: {EXPORT}")
     return FOLDER / f"{policy.removeprefix(PREFIX)}{SUFFIX}"
 
 
@@ -129,22 +129,25 @@ def read(path: Path) -> Policy:
     card_path = path.with_suffix(".json")
     for file in (path, card_path):
         if not file.exists():
-            raise CheckpointError(f"No {file}: a policy is NAME{SUFFIX} and NAME.json; {EXPORT}")
+            raise CheckpointError(
+                f"{file} is missing: a policy consists of NAME{SUFFIX} and "
+                f"NAME.json; export one with: {EXPORT}"
+            )
     try:
         card = from_mapping(Card, json.loads(card_path.read_text()))
     except (ConfigError, ValueError, AttributeError) as error:
-        raise CheckpointError(f"{card_path} is no card of a policy: {error}") from error
+        raise CheckpointError(f"{card_path} is not a model card of a policy: {error}") from error
     content = path.read_bytes()
     if content[:1] == b"\x80" or content[:2] == b"PK":
         raise CheckpointError(
-            f"{path} is a pickled file, which could execute anything, and is not read. Policies "
-            f"are safetensors: {EXPORT}"
+            f"{path} is a pickle, which could execute arbitrary code, and is not loaded. Policies "
+            f"are safetensors files; export one with: {EXPORT}"
         )
     digest = hashlib.sha256(content).hexdigest()
     if digest != card.sha256:
         raise CheckpointError(
-            f"{path} is damaged, or does not belong to its card: its SHA-256 is {digest}, that of "
-            f"the card {card.sha256}. Fetch or export it again."
+            f"{path} is damaged or does not belong to its model card: its SHA-256 is {digest}, but "
+            f"the card states {card.sha256}. Download or export it again."
         )
     return Policy(card, _load_network(path, content, card))
 
@@ -168,7 +171,7 @@ def load(path: Path, env_info: EnvInfo) -> Network:
 def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
     """Describe each difference between a policy's training environment and the given one."""
     texts = [
-        f"its {name} is {theirs}, here it is {ours}"
+        f"its {name} is {theirs}, but here it is {ours}"
         for name, theirs, ours in (
             ("task", card.task, ancestor_of(env_info.task, [card.task])),
             ("control", card.control, env_info.control),
@@ -181,9 +184,9 @@ def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
     for name in [*theirs, *(ours.keys() - theirs.keys())]:
         if theirs.get(name) != ours.get(name):
             old, new = _describe_term(theirs.get(name)), _describe_term(ours.get(name))
-            texts.append(f"its observation's {name} has {old}, here {new}")
+            texts.append(f"its observation's {name} has {old}, but here {new}")
     if not texts and list(theirs) != list(ours):
-        texts.append("its observation's terms have another order")
+        texts.append("the terms of its observation have a different order")
     return texts
 
 

@@ -105,8 +105,7 @@ def _check_free(path: Path) -> Path:
     """Return the path of a folder to create; raise `ConfigError` if it already exists."""
     if path.exists():
         raise ConfigError(
-            f"{path} exists already, and nothing is added to it: choose another --folder, or "
-            "delete it."
+            f"{path} exists already and is not extended: choose another --folder, or delete it."
         )
     return path
 
@@ -163,8 +162,8 @@ def _import_minari() -> Any:
         import minari
     except ModuleNotFoundError as error:
         raise MissingExtraError(
-            f"Data sets need {error.name}, which is not installed. Type: "
-            'pip install "hrc_env[minari]"'
+            f"Data sets need {error.name}, which is not installed. Install it with: pip install "
+            '"hrc_env[minari]"'
         ) from error
     return minari
 
@@ -177,15 +176,15 @@ def _find_minari_path(minari: Any, name: str) -> Path:
         namespace, short, version = parse_dataset_id(name)
     except (ValueError, TypeError) as error:
         raise ConfigError(
-            "--out must be a name of letters, digits, - and _, with optional folders, and end in "
-            f"a version, as hrc/pick-place/scripted-v0; got {name!r}."
+            "--out must be a name of letters, digits, - and _, with optional folders, and end in a "
+            f"version, such as hrc/pick-place/scripted-v0; got {name!r}."
         ) from error
     path = minari.storage.get_dataset_path(name)
     if path.exists():
         head = f"{namespace}/" if namespace else ""
         raise ConfigError(
-            f"The data set {name!r} exists already ({path}), and nothing is added to it. Choose "
-            f"another name, as {head}{short}-v{version + 1}, or delete it: minari delete {name}"
+            f"The data set {name!r} exists already ({path}) and is not extended. Choose another "
+            f"name, such as {head}{short}-v{version + 1}, or delete it: minari delete {name}"
         )
     return path
 
@@ -195,8 +194,8 @@ def _check_same_request(request: RecordingRequest, draft: Path) -> None:
     record, text = draft / "asked.json", json.dumps(asdict(request), indent=1, default=str)
     if record.exists() and record.read_text() != text:
         raise ConfigError(
-            f"{draft} holds episodes that were recorded with other arguments ({record}): use the "
-            "same arguments, delete the folder, or choose another name with --out."
+            f"{draft} contains episodes that were recorded with other arguments ({record}): use "
+            "the same arguments, delete the folder, or choose another name with --out."
         )
     write_whole(record, text)
 
@@ -238,9 +237,9 @@ def _choose_parts(
         if n_bytes > MOST_BYTES:
             raise ConfigError(
                 f"Images of {len(images.names)} cameras, {images.shape[0]} x {images.shape[1]}, "
-                f"are {n_bytes / 2**30:.1f} GiB for {n} episodes played together, and at most "
-                f"{MOST_BYTES / 2**30:.0f} are held in memory: observe smaller images, fewer "
-                "cameras, or play fewer environments together (--num-envs)."
+                f"are {n_bytes / 2**30:.1f} GiB for {n} simultaneous episodes, but at most "
+                f"{MOST_BYTES / 2**30:.0f} are kept in memory: observe smaller images, fewer "
+                "cameras, or use fewer parallel environments (--num-envs)."
             )
     return MomentParts(tuple(names), request.poses, request.keypoints)
 

@@ -36,7 +36,7 @@ with learner():
     from stable_baselines3.common.policies import BasePolicy
     from stable_baselines3.common.vec_env import VecNormalize
 
-TRUST = "If you trust its author: --trust, in Python trust=True."
+TRUST = "If you trust its author, use --trust (in Python, trust=True)."
 PICKLED = ":serialized:"
 """Key of the base64-encoded pickle of a value that JSON cannot represent."""
 POLICIES = {
@@ -113,8 +113,8 @@ def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
     """Raise `CheckpointError` if a policy was trained with another `control`."""
     if control != env_info.control:
         raise CheckpointError(
-            f"{path} acts by control={control!r}, and this environment has control="
-            f"{env_info.control!r}: make it with the former (--control {control})."
+            f"{path} uses control={control!r}, but this environment has "
+            f"control={env_info.control!r}: create it with the former (--control {control})."
         )
 
 
@@ -210,18 +210,19 @@ def _read(path: Path) -> PolicyFile:
             data, content = json.loads(archive.read("data")), archive.read("policy.pth")
     except (zipfile.BadZipFile, KeyError, ValueError) as error:
         raise CheckpointError(
-            f"{path} is neither a checkpoint of hrc_env nor a policy that Stable-Baselines3 saved "
-            f"({error}). Expected is a file of python -m hrc_env train or model.save (.zip)."
+            f"{path} is neither a checkpoint of hrc_env nor a policy saved by Stable-Baselines3 "
+            f"({error}). Expected a file of python -m hrc_env train or model.save (.zip)."
         ) from error
     if not isinstance(data, dict):
-        raise CheckpointError(f"{path} is not a policy that Stable-Baselines3 saved.")
+        raise CheckpointError(f"{path} is not a policy saved by Stable-Baselines3.")
     try:
         weights = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError) as error:
         first = str(error).splitlines()[0]
         raise CheckpointError(
-            f"policy.pth in {path} contains no weights, or more than weights ({first}), and is "
-            "not read: Stable-Baselines3 writes tensors by name."
+            f"policy.pth in {path} contains no weights, or other objects besides weights "
+            f"({first}), and is not loaded: Stable-Baselines3 stores a dictionary of tensors by "
+            "name."
         ) from error
     if not (
         isinstance(weights, dict) and all(isinstance(w, torch.Tensor) for w in weights.values())
@@ -242,7 +243,7 @@ def _check_spaces(
 ) -> None:
     """Raise `CheckpointError` if a policy's spaces are not those of the environment."""
     advice = (
-        f"Make the environment as in its training ({env_info.task} here, "
+        f"Create the environment as in training (here {env_info.task}, "
         f"control={env_info.control!r}: task, control, robot, n_workers and observe_images "
         "decide), or wrap it in your own agent (MODULE:FUNCTION)."
     )
@@ -259,14 +260,14 @@ def _check_spaces(
         else:
             continue
         raise CheckpointError(
-            f"{path} is for {name}s of {text}, this environment has {_describe_shapes(expected)}. "
-            f"{advice}"
+            f"{path} is for {name}s of {text}, but this environment has "
+            f"{_describe_shapes(expected)}. {advice}"
         )
     for end, bound in (("low", -1.0), ("high", 1.0)):
         values = _parse_numbers(data["action_space"].get(end))
         if values.size and not np.allclose(values, bound):
             raise CheckpointError(
-                f"{path} has other bounds of actions: its action space has {end} "
+                f"{path} has different action bounds: its action space has {end} "
                 f"{data['action_space'][end]}, here it is {bound:g}. {advice}"
             )
 
@@ -326,8 +327,8 @@ def _find_maker(path: Path, data: Mapping[str, Any], trust: bool) -> PolicyMaker
     unread += [f"{name} ({value})" for name, value in strange.items()]
     if unread and not trust:
         raise CheckpointError(
-            f"{path} can only be read with its pickle: {', '.join(unread)} is not of "
-            f"Stable-Baselines3. A pickle can run arbitrary code of its author. {TRUST}"
+            f"{path} can only be loaded with its pickle: {', '.join(unread)} is not part of "
+            f"Stable-Baselines3. A pickle can execute arbitrary code. {TRUST}"
         )
     if make is None:
         make = _unpickle(path, "policy_class", kind, type)
@@ -383,8 +384,8 @@ def _unpickle(path: Path, name: str, saved: Mapping[str, Any], expected: type) -
         found = cloudpickle.loads(base64.b64decode(saved[PICKLED]))
     except Exception as error:  # custom objects can raise any exception
         raise CheckpointError(
-            f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). "
-            "Its classes must be importable here."
+            f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). Its "
+            "classes must be importable."
         ) from error
     if not isinstance(found, expected):
         raise CheckpointError(
@@ -402,7 +403,7 @@ def _build(
     except Exception as error:  # a constructor with arguments from a file can raise anything
         first = " ".join(str(error).split())[:300]
         raise CheckpointError(
-            f"The weights in {path} are not those of the policy that it describes ({first})."
+            f"The weights in {path} do not match the policy that it describes ({first})."
         ) from error
     policy.set_training_mode(False)
     return policy
@@ -428,9 +429,9 @@ def _load_statistics(path: Path, trust: bool) -> Statistics | None:
         return None
     if not trust:
         raise CheckpointError(
-            f"{file} beside {path.name} holds the statistics with which VecNormalize scaled "
-            "observations or rewards. It is a pickle, which can run arbitrary code of its author. "
-            f"{TRUST} If observations were not scaled, move that file away."
+            f"{file} beside {path.name} contains the statistics with which VecNormalize scaled "
+            f"observations or rewards. It is a pickle, which can execute arbitrary code. {TRUST} "
+            "If observations were not scaled, move that file away."
         )
     try:
         wrapper = pickle.loads(file.read_bytes())
@@ -438,7 +439,7 @@ def _load_statistics(path: Path, trust: bool) -> Statistics | None:
         raise CheckpointError(f"{file} cannot be unpickled ({error}).") from error
     if not isinstance(wrapper, VecNormalize):
         raise CheckpointError(
-            f"{file} must hold the statistics of a VecNormalize, got {type(wrapper).__name__}."
+            f"{file} must contain the statistics of a VecNormalize, got {type(wrapper).__name__}."
         )
     wrapper.training = False
     return Statistics(wrapper) if wrapper.norm_obs else None

@@ -121,7 +121,10 @@ def run(arguments: TrainingRequest) -> int:
         written.append("curve.png")
     limit, cost = mine.cost_limit, score.cost_per_episode
     if limit is not None and cost > 1.1 * limit:
-        text = f"The limit of {limit:g} is exceeded: these episodes cost {cost:.1f} each. Train "
+        text = (
+            f"The limit of {limit:g} is exceeded: the mean cost of these episodes is "
+            f"{cost:.1f}. Train "
+        )
         console.print(text + "longer with --resume and more --timesteps, or set a higher limit.")
     if mine.film and film(folder, mine, console):
         written.append("policy.mp4")
@@ -170,7 +173,7 @@ def restore_arguments(arguments: TrainingRequest, folder: Path) -> TrainingReque
     learnt = checkpoints.describe(folder / "policy.zip")["num_timesteps"]
     if learnt >= total:
         raise CheckpointError(
-            f"{folder} was trained for {learnt} steps already; set --timesteps to more than that."
+            f"{folder} was already trained for {learnt} steps; set --timesteps to a larger number."
         )
     own = {name: getattr(arguments, name) for name in ONLY_OF_A_RUN}
     return replace(before, **{**own, "timesteps": total})
@@ -184,7 +187,7 @@ def read_arguments(folder: Path) -> TrainingRequest:
     """
     record = folder / "run.json"
     if not record.exists():
-        raise CheckpointError(f"{folder} holds no run: {record} is missing.")
+        raise CheckpointError(f"{folder} contains no training run: {record} is missing.")
     saved = json.loads(record.read_text())["arguments"]
     if saved.get("n_workers") is not None:  # earlier versions stored numbers, not words
         saved["n_workers"] = [str(n) for n in np.atleast_1d(saved["n_workers"])]
@@ -229,7 +232,7 @@ def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:
         return TrainingResult(curve, {"training_s": passed_s, "processor_s": worked_s})
     words = ["python", "-m", "hrc_env", "train", "--resume", str(folder)]
     words += ["--timesteps", str(total)]
-    text = f"Stopped at {learner.num_timesteps:,} steps, which are saved. To continue: "
+    text = f"Stopped at {learner.num_timesteps:,} steps; the state is saved. To continue:  "
     console.print(text + shlex.join(words), markup=False, highlight=False, soft_wrap=True)
     return TrainingResult(curve, None)
 
@@ -304,7 +307,7 @@ def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
         seed = find_nearest_seed(make, seeds, **kwargs)
         film_episode(make, folder / "policy.mp4", seed, **kwargs)
     except RenderingError as error:
-        console.print(f"No film: {error}", markup=False)
+        console.print(f"No video was recorded: {error}", markup=False)
         return False
     return True
 

@@ -72,11 +72,11 @@ class TrackingArguments(BenchArguments):
         """Run the benchmark and print its tables; return the exit status."""
         check_at_least("--seeds", self.seeds, 1)
         if self.real and self.baselines:
-            raise ConfigError("--real and --baselines are two benchmarks; choose one.")
+            raise ConfigError("--real and --baselines are separate benchmarks; choose one of them.")
         if (self.real or self.baselines) and (self.estimators or self.sequences):
             raise ConfigError(
                 "--estimators and --sequences select simulated sequences, which --real and "
-                "--baselines do not use: leave one of them out."
+                "--baselines do not use: leave out one of them."
             )
         if self.baselines:
             from benchmarks.tracking.baselines.bench import N_QUICK, BaselinesBench

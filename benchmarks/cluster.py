@@ -107,7 +107,7 @@ class ClusterBench:
     def quick_note(self) -> str:
         """Warning for the table of a short run, or "" if the run is long enough."""
         is_short = self.n_rounds < ClusterBench().n_rounds
-        return f"Quick run, {self.n_rounds} rounds: too few to compare." if is_short else ""
+        return f"Quick run, {self.n_rounds} rounds: too few for a comparison." if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return the settings on which the metrics depend."""
@@ -164,7 +164,7 @@ class ClusterBench:
         about = (__doc__ or "").partition("\n")[2].strip()
         parts = [
             TABLE.to_markdown(metrics),
-            format_picture(drawn, "A run of two workers, as Ray exports it"),
+            format_picture(drawn, "A run with two workers, exported by Ray"),
         ]
         return Report("Workers of RLlib", about, parts, "smallest and largest rounds")
 
@@ -180,7 +180,7 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
     from hrc_env.sb3 import HRCVecEnv
 
     if n_cores() < max(MEASURED):
-        raise ConfigError(f"Two workers want two cores, and this machine has {n_cores()}.")
+        raise ConfigError(f"Two workers need two cores, but this machine has {n_cores()}.")
     with cluster.connected(None):
         made: dict[int, Any] = {}
         try:

@@ -149,7 +149,7 @@ class ReplayCache(PartCache):
         if (key or self.key) == recorded.key:
             replayed = _replay_part(make, recorded)
         else:
-            difference = "its settings are not those of its record"
+            difference = "its settings differ from those of its record"
             replayed = ReplayedPart(Unplayed(), difference)
         if replayed.difference:
             self.spoiled[label] = replayed.difference
@@ -226,7 +226,7 @@ def main(arguments: Arguments) -> int:
 def explain_skip(name: str, record: records.Record) -> str:
     """Return the reason why no part of a study can be replayed, or "" if a part can."""
     if name not in REPLAYS:
-        return "it keeps no parts; only a whole run verifies its numbers"
+        return "it stores no parts; only a complete run verifies its numbers"
     if why := results.explain_stale(name):
         return f"it is stale already: {why}"
     if not record.parts:
@@ -316,7 +316,7 @@ def replay(
             if study.is_learnt(label):
                 outcome.lacking.setdefault(name, []).append(label)
             else:
-                cache.spoiled[label] = "the study no longer makes it"
+                cache.spoiled[label] = "the study no longer computes it"
     if cache.spoiled:
         outcome.spoiled[name] = dict(cache.spoiled)
         records.save(name, replace(record, spoiled={**record.spoiled, **cache.spoiled}))
@@ -351,7 +351,7 @@ def describe(outcome: Outcome) -> list[str]:
     lines.append(f"{n_drawn} parts were drawn, and {n_spoiled} differ, in {outcome.seconds:.0f} s.")
     if outcome.finds_share is not None and outcome.finds_scattered_share is not None:
         lines.append(
-            "Such a draw finds a spoiled part with 95 % if at least "
+            "Such a draw finds a spoiled part with a probability of 95 % if at least "
             f"{100 * outcome.finds_share:.1f} % of the parts are spoiled, at any positions; "
             f"{100 * outcome.finds_scattered_share:.1f} % suffice if they are scattered at random; "
             "it always does if all parts of a row are spoiled."

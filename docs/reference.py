@@ -51,7 +51,7 @@ HOOKS = """\
 
 This page lists the methods and functions of your own code that the package calls, with their
 arguments ([bring your own](../bring_your_own/index.md)). Code with other arguments or wrong results
-raises an error when it is registered, or when an environment is made.
+raises an error when it is registered, or when an environment is created.
 
 ## Tasks
 
@@ -399,7 +399,7 @@ def observation_table(env: HRCEnv) -> str:
 
 
 def _meaning(entry: Entry) -> str:
-    return entry.meaning + (f" (`{entry.flag}`: whether it was)" if entry.flag else "")
+    return entry.meaning + (f" (`{entry.flag}`: whether it was measured)" if entry.flag else "")
 
 
 def infos() -> str:
@@ -431,25 +431,25 @@ def infos() -> str:
     rows += [(f"`worker_N/{name}`", "-", text) for name, text in OF_WORKERS.items()]
     rows += [
         (f"`{FAULT}{name}`", each.unit,
-         f"drawn: largest amount of this fault ({each.description}); "
-         f"{NEUTRAL.get(name, 0.0):g} without the fault"
-         f"{', 1 with it' if each.bounds == (0.0, 0.0) else ''}; at `pixels`"
-         f"{' and `keypoints`' if each.group != IMAGE or name in EMULATED else ''}")
+         f"drawn per episode: largest amount of this fault ({each.description}); "
+         f"{NEUTRAL.get(name, 0.0):g} without the "
+         f"fault{', 1 with it' if each.bounds == (0.0, 0.0) else ''}; at "
+         f"`pixels`{' and `keypoints`' if each.group != IMAGE or name in EMULATED else ''}")
         for name, each in KINDS.items()
     ]  # fmt: skip
-    rows.append(("`shield/...`", "-", "further values that your own shield returns"))
+    rows.append(("`shield/...`", "-", "further values that a custom shield returns"))
     return "\n".join(
         (
             "# Keys of info\n",
             f"{NOTICE}\n",
             "This page lists the keys of `info`. Costs, separations and tracking errors are "
             "computed from the truth, and rewards from the belief. Values that were drawn for an "
-            "episode, as of its cameras, are truth, too: an agent must not read them.\n\nThe keys "
-            "are the same in every step and at the reset, and all values are numbers. Where a "
-            "value was not measured in a step, it has the substitute given below, and a key that "
-            "ends in `_measured` is 0. `env.unwrapped.words(info)` translates indices into words. "
-            "A vector environment returns an array and a mask `_name` for each key ([many "
-            "environments](../many_environments.md)).\n",
+            "episode, such as properties of its cameras, are part of the truth, too: an agent must "
+            "not use them.\n\nThe keys are the same in every step and at the reset, and all values "
+            "are numbers. Where a value was not measured in a step, it has the substitute given "
+            "below, and a key that ends in `_measured` is 0. `env.unwrapped.words(info)` "
+            "translates indices into words. A vector environment returns an array and a mask "
+            "`_name` for each key ([many environments](../many_environments.md)).\n",
             _table(("key", "unit", "meaning"), rows) + "\n",
         )
     )
@@ -528,7 +528,7 @@ SHIELDS = """\
 A shield changes the joint velocities of an agent before the arm executes them, so that the robot
 keeps its distance from people. Every environment takes one as `shield=`, and commands as
 `--shield`. A shield reads the estimated bodies with their velocities and covariances, and the floor
-on which a person may be unseen. It keeps nothing from step to step. **None of this is certified:
+on which a person may be unseen. It has no state between steps. **None of this is certified:
 verify all numbers against the standards.**
 
 ```python

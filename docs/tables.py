@@ -66,7 +66,7 @@ def declared(name: str) -> tuple[str, Table]:
     for which, command in COMMANDS.items():
         if name in command.tables and (table := command.declared_tables.get(name)) is not None:
             return which, table
-    raise KeyError(f"No study declares the table {name!r}; there are {', '.join(names())}.")
+    raise KeyError(f"No study declares the table {name!r}; valid are {', '.join(names())}.")
 
 
 def read(name: str) -> Result:

@@ -271,7 +271,9 @@ def __getattr__(name: str) -> Any:
     lower = {each.lower(): each for each in PUBLIC}
     near = difflib.get_close_matches(name.lower(), lower, n=1)
     hint = f" Did you mean {lower[near[0]]!r}?" if near else ""
-    raise AttributeError(f"hrc_env has no attribute {name!r}.{hint} Public names: dir(hrc_env).")
+    raise AttributeError(
+        f"hrc_env has no attribute {name!r}.{hint} dir(hrc_env) lists all public names."
+    )
 
 
 class FormerNames:

@@ -18,12 +18,11 @@ PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
     "setup": (
         "hrc_env.cli.setup", "Setup",
-        "Fetch the weights of the pose network, compile the kernels and check headless OpenGL.",
+        "Download the weights of the pose network, compile the kernels and check headless OpenGL.",
     ),
     "demo": (
         "hrc_env.cli.play", "Demo",
-        "Film a scripted robot that slows down near a person, whom it detects in rendered"
-        " images.",
+        "Film a scripted robot that detects a person in rendered images and slows down near them.",
     ),
     "check": (
         "hrc_env.cli.check", "Check",
@@ -31,7 +30,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "List the names that arguments take: tasks, perception levels, robots, agents and others.",
+        "List the valid names for arguments: tasks, perception levels, robots, agents and others.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",
@@ -39,31 +38,32 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "evaluate": (
         "hrc_env.cli.evaluate", "Evaluate",
-        "Score an agent over whole episodes with fixed seeds: goals, contacts and cost.",
+        "Evaluate an agent over whole episodes with fixed seeds: goals, contacts and cost.",
     ),
     "train": (
         "hrc_env.cli.train", "Train",
-        "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",
+        "Train a policy, evaluate it on fixed seeds, plot its learning curve and record a video.",
     ),
     "export": (
         "hrc_env.cli.export", "Export",
-        "Write a run's policy as a file that executes no code, and a model card with its scores.",
+        "Export a run's policy and a model card with its scores; loading the file executes no "
+        "code.",
     ),
     "record": (
         "hrc_env.cli.record", "Record",
-        "Record an agent's episodes as a data set of Minari or a folder.",
+        "Record an agent's episodes as a Minari data set or in a folder.",
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "Run an experiment of the paper or of this package.",
+        "Run an experiment of the paper or an additional one.",
     ),
     "benchmark": (
         "hrc_env.cli.benchmark", "Benchmark",
-        "Score a policy on fixed seeds in the setups of the benchmark.",
+        "Evaluate a policy on fixed seeds in the setups of the benchmark.",
     ),
     "import-motion": (
         "hrc_env.cli.import_motion", "ImportMotion",
-        "Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
+        "Convert a motion-capture recording (BVH, ASF/AMC or npz) into a clip that workers play.",
     ),
 }  # fmt: skip
 """Module and class of each command, and the first sentence of the class's docstring, by name."""
@@ -107,7 +107,7 @@ Reinforcement learning of robots that observe people only through cameras.
 {commands}
 
 {PROGRAM} COMMAND --help lists the options of a command. Every command also
-takes --import FILE, a Python file that registers parts of your own."""
+takes --import FILE, a Python file that registers custom parts."""
 
 
 def versions() -> str:

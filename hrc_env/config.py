@@ -164,5 +164,8 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
     """
     for motion in config.motion.motions:
         if not isinstance(motion, str):
-            raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")
+            raise ConfigError(
+                f"The clip {motion.source!r} is held in memory and cannot be "
+                "written: use the path of its file instead."
+            )
     write_whole(Path(path), to_toml(convert_to_plain(asdict(config))))

@@ -77,8 +77,9 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
         raise make_unknown_name_error("control", control, CONTROLS)
     if control != "joint" and chain.slides.any():
         raise ConfigError(
-            f"control={control!r} moves the tool of an arm of hinges; this robot has slides, as "
-            'a base that drives has: valid is control="joint", a velocity for each joint.'
+            f"control={control!r} moves the tool of an arm with revolute joints only; this robot "
+            'has prismatic joints, such as those of a mobile base: valid is control="joint", a '
+            "velocity for each joint."
         )
     return {"joint": chain.n_joints, "tool": 3, "twist": 6}[control] + grips
 

@@ -67,8 +67,8 @@ class EnvBase(HasSpec, Stateful):
         self._shown = parse_overlays(asked.render_markers, asked.overlay)
         if asked.overlay is not None and not str(asked.render_mode).startswith("rgb_array"):
             warnings.warn(
-                f"overlay={asked.overlay!r} is drawn in pictures of render_mode='rgb_array' only, "
-                f"got render_mode={asked.render_mode!r}.",
+                f"overlay={asked.overlay!r} requires render_mode='rgb_array', got "
+                f"render_mode={asked.render_mode!r}.",
                 stacklevel=4,
             )
         self.render_mode = asked.render_mode
@@ -112,8 +112,8 @@ class EnvBase(HasSpec, Stateful):
         separate_goal = require_goal(self._task)
         if self._task.can_end:
             raise NoAttributeError(
-                f"{self._task.id} ends episodes itself (Task.is_terminal), which does not follow "
-                "from goals and infos: read `terminated` of `step`."
+                f"{self._task.id} terminates episodes by Task.is_terminal, which cannot be "
+                "computed from goals and infos: use `terminated`, which `step` returns."
             )
         entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
         return partial(goal.compute_terminated, separate_goal, entries=entries)
@@ -393,9 +393,10 @@ def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
     for name in options if isinstance(options, Mapping) else ():
         if name == "elapsed_steps":
             raise ConfigError(
-                "elapsed_steps is an option of vector environments: one environment does not know "
-                'its time limit, which is a wrapper of gymnasium. Say options={"steps_left": n} '
-                "(time limit minus elapsed steps), which both take."
+                "elapsed_steps is an option of vector environments: a single environment does not "
+                "know its time limit, which a wrapper of gymnasium enforces. Use "
+                'options={"steps_left": n} (time limit minus elapsed steps), which is valid for '
+                "both."
             )
     return named_options(options)
 
@@ -409,9 +410,9 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
     """Raise `ConfigError` for a render mode that is not among the valid ones."""
     if render_mode == "human":
         raise ConfigError(
-            "render_mode='human' is a window round an environment that draws: gymnasium.make("
-            "ID, render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
-            "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
+            "render_mode='human' requires a wrapper that shows a window: gymnasium.make(ID, "
+            "render_mode='human') adds it (pip install 'hrc_env[view]'), or wrap an environment "
+            "with render_mode='rgb_array' in gymnasium.wrappers.HumanRendering."
         )
     if render_mode is not None and render_mode not in valid:
         raise make_unknown_name_error("render_mode", render_mode, valid)

@@ -154,8 +154,8 @@ class EnvConfig:
         content = read_toml(path)
         if "task" in content and not isinstance(content["task"], str):
             raise ConfigError(
-                f"{path}: task must be an id, got {content['task']!r}; its settings are "
-                "[config.task]."
+                f"{path}: task must be an id, got {content['task']!r}; settings of the task belong "
+                "in [config.task]."
             )
         return cls(**content)
 

@@ -42,7 +42,8 @@ def read_config(words: Sequence[str]) -> dict[str, Any]:
     for word in words:
         if "=" not in word and not word.endswith(".toml"):
             raise ConfigError(
-                f"--config takes FIELD=VALUE, as reward.proximity=0, or a .toml file, got {word!r}."
+                "--config takes FIELD=VALUE, such as reward.proximity=0, or a .toml file, got "
+                f"{word!r}."
             )
         config = merge(config, _read_assignment(word) if "=" in word else read_toml(word))
     return config
@@ -61,7 +62,7 @@ def _read_fault(text: str) -> dict[str, Any]:
     """Parse the mapping of a fault, or raise `ConfigError` if the text is not a JSON object."""
     fault = _read_value(text)
     if not isinstance(fault, dict):
-        raise ConfigError(f"--faults takes JSON objects, as {FAULT}, got {text!r}.")
+        raise ConfigError(f"--faults takes JSON objects, such as {FAULT}, got {text!r}.")
     return fault
 
 
@@ -95,14 +96,14 @@ READERS: dict[str, Callable[[Any], Any]] = {
 AGENTS_OWN = ("control",)
 """Arguments whose default is determined by the agent."""
 ON_THE_COMMAND_LINE = {
-    "faults": "Each is a JSON object.",
-    "cameras": "A RigDistribution is a JSON object.",
-    "observe_images": "Here: HEIGHT WIDTH, or a JSON object.",
-    "people": "--config motion.people.FIELD=VALUE changes one thing.",
-    "appearance": "--config appearance.FIELD=VALUE changes one thing.",
-    "control": "If not given: the agent's own, or joint.",
-    "config": "Here: FIELD=VALUE as in reward.proximity=0 (a value is JSON, or else text), or "
-    ".toml files; later ones win.",
+    "faults": "On the command line, each fault is a JSON object.",
+    "cameras": "On the command line, a RigDistribution is a JSON object.",
+    "observe_images": "On the command line: HEIGHT WIDTH, or a JSON object.",
+    "people": "--config motion.people.FIELD=VALUE changes a single setting.",
+    "appearance": "--config appearance.FIELD=VALUE changes a single setting.",
+    "control": "Default: the control of the agent, or joint.",
+    "config": "On the command line: FIELD=VALUE, such as reward.proximity=0 (the value is JSON, "
+    "otherwise text), or .toml files; later ones take precedence.",
 }
 """Sentences that the help of commands adds to the descriptions of arguments, by name."""
 

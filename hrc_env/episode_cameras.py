@@ -57,9 +57,9 @@ class EpisodeCameras:
         )
         if images is not None and settings.rigs is not None and not has_cameras:
             raise ConfigError(
-                f"cameras=RigDistribution(...) is of a perception level with cameras, and at "
-                f"perception={level!r} no rig is drawn, which images would show: use "
-                f"{' or '.join(map(repr, CAMERA_LEVELS))}, or give one rig."
+                "cameras=RigDistribution(...) requires a perception level with cameras; with "
+                f"perception={level!r} no rig is drawn per episode, although images would show it: "
+                f"use {' or '.join(map(repr, CAMERA_LEVELS))}, or pass a single rig."
             )
         bends = settings.rigs is not None and settings.rigs.bends
         self.images = None if images is None else ObservedImages(scene, images, bends)

@@ -199,7 +199,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="tool",
         bound=0.2,
         scale=0.05,
-        doc="Distance of each finger from the middle.",
+        doc="Distance of each finger from the center of the gripper.",
         function=lambda belief: _hand(belief).opening_m,
     ),
     ObservationTerm(
@@ -209,7 +209,8 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="tool",
         bound=300.0,
         scale=100.0,
-        doc="Force that presses the fingers together, negative: apart; or the load on the cups.",
+        doc="Force that closes the fingers (negative if it opens them), or the load on the suction "
+        "cups.",
         function=lambda belief: _hand(belief).force_n,
     ),
     ObservationTerm(
@@ -219,7 +220,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=3.0,
         scale=0.5,
-        doc="From the tool point to the middle of each loose object, as measured.",
+        doc="Measured center of each loose object, relative to the tool point.",
         function=lambda belief: _objects(belief).position_world - belief.robot.tool_world[:, None],
     ),
     ObservationTerm(
@@ -229,7 +230,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=1.0,
         scale=1.0,
-        doc="Each object's y axis and z axis, as measured.",
+        doc="Measured y axis and z axis of each loose object.",
         function=lambda belief: matrix(_objects(belief).quaternion_wxyz)[..., 1:].swapaxes(-1, -2),
     ),
     ObservationTerm(
@@ -239,7 +240,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="1 for an object that is held.",
+        doc="1 if the robot holds the object, else 0.",
         function=lambda belief: _objects(belief).held.astype(float),
     ),
 )
@@ -253,7 +254,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=10.0,
         scale=5.0,
-        doc="Position of each slide: for a mobile base, x and y of its middle.",
+        doc="Position of each prismatic joint; for a mobile base, x and y of its center.",
         function=lambda belief: _slides(belief, belief.robot.q),
     ),
     ObservationTerm(
@@ -263,7 +264,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=4.0,
         scale=1.0,
-        doc="Velocity of each slide.",
+        doc="Velocity of each prismatic joint.",
         function=lambda belief: _slides(belief, belief.robot.qd),
     ),
 )
@@ -277,7 +278,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="The agent's action of the previous step, before any shield.",
+        doc="Action of the agent in the previous step, before any shield changed it.",
         function=lambda belief: belief.action,
     ),
     ObservationTerm(
@@ -287,7 +288,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=6.0,
         scale=1.0,
-        doc="From the tool point to each estimated joint of each worker.",
+        doc="Estimated position of each joint of each worker, relative to the tool point.",
         function=lambda belief: belief.estimate.mean_world - belief.robot.tool_world[:, None, None],
     ),
     ObservationTerm(
@@ -297,7 +298,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=1.0,
         scale=0.25,
-        doc="Standard deviation of each estimated joint (root mean over the axes).",
+        doc="Standard deviation of each estimated joint (root mean square over the axes).",
         function=lambda belief: standard_deviation_m(belief.estimate),
     ),
     ObservationTerm(
@@ -327,7 +328,8 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="1 while there is a track of the worker, 0 where the estimate is the prior or lost.",
+        doc="1 while the worker is tracked, 0 while the estimate is the prior or the track is "
+        "lost.",
         function=lambda belief: belief.estimate.tracked.astype(float),
     ),
     ObservationTerm(
@@ -337,7 +339,8 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="1 while a person without a track may be near: lost, or on floor not seen empty.",
+        doc="1 while an untracked person may be near, because a track is lost or floor is "
+        "unobserved.",
         function=lambda belief: belief.estimate.unknown.astype(float),
     ),
     ObservationTerm(
@@ -347,7 +350,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=5.0,
         scale=2.5,
-        doc="Time since cameras last saw the worker, or that the place is empty.",
+        doc="Time since cameras last observed the worker, or observed that the slot is empty.",
         function=lambda belief: belief.estimate.unobserved_s,
     ),
     ObservationTerm(
@@ -357,7 +360,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=FAR_SEPARATION_M,
         scale=0.5,
-        doc="Distance between the robot's surface and the estimated body's, at most 1 m.",
+        doc="Distance between the surfaces of the robot and the estimated body, at most 1 m.",
         function=lambda belief: np.minimum(belief.separation.distance_m, FAR_SEPARATION_M),
     ),
     ObservationTerm(
@@ -367,7 +370,8 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=1.0,
         scale=1.0,
-        doc="Unit vector from the robot to the estimated body where they are nearest; 0 if far.",
+        doc="Unit vector from the robot to the estimated body at their closest points; 0 beyond 1 "
+        "m.",
         function=_nearest_direction,
     ),
     ObservationTerm(
@@ -377,7 +381,8 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=6.0,
         scale=1.0,
-        doc="From the present tool point to each joint's forecast, for each of `forecast_s`.",
+        doc="Forecast of each joint, relative to the current tool point, for each time of "
+        "`forecast_s`.",
         function=_joints_forecast,
     ),
     ObservationTerm(
@@ -387,7 +392,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=1.0,
         scale=0.25,
-        doc="Standard deviation of each of these forecasts (root mean over the axes).",
+        doc="Standard deviation of each of these forecasts (root mean square over the axes).",
         function=lambda belief: np.stack(
             [standard_deviation_m(later) for later in belief.forecast], axis=2
         ),
@@ -399,7 +404,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=0.25,
-        doc="Standard deviation of each joint along the line to the nearest point of the robot.",
+        doc="Standard deviation of each joint in the direction of the closest point of the robot.",
         function=lambda belief: deviation_towards_robot_m(belief.robot, belief.estimate),
     ),
     ObservationTerm(
@@ -424,8 +429,11 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
         frame="base",
         bound=4.0,
         scale=1.0,
-        doc="Joint velocities of the shield in the previous step, less those of the agent.",
-        function=lambda belief: require(belief.shield_change, "What the shield changed"),
+        doc="Joint velocities after the shield in the previous step, minus those that the agent "
+        "requested.",
+        function=lambda belief: require(
+            belief.shield_change, "The change of the command by the shield"
+        ),
     ),
 )
 """Observation terms that are appended if `HRCConfig.observe_shield` is true."""
@@ -482,7 +490,7 @@ def observe(
     values = [_value(term, belief) for term in present]
     for term, value in zip(present, values, strict=True):
         name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
-        check_shape(name, rows, (batch,), "one an environment")
+        check_shape(name, rows, (batch,), "one entry per environment")
     parts = [value.reshape(batch, -1) for value in values]
     physical = np.concatenate(parts, axis=1)
     if physical.shape[1] != len(layout.scale):
@@ -492,7 +500,9 @@ def observe(
     observation = np.empty(physical.shape, np.float32)
     if not _scale(physical, layout.scale, layout.low, layout.high, observation):
         names = [name for name, part in layout.slices.items() if np.isnan(physical[:, part]).any()]
-        raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
+        raise FloatingPointError(
+            f"Observation terms that are not finite numbers: {', '.join(names)}."
+        )
     return observation
 
 

@@ -233,19 +233,19 @@ def _add(table: "Registry[EntryT]", name: str, entry: EntryT, is_function: bool 
     if is_function and not callable(entry):
         raise ConfigError(f"{name}: a {table.kind} must be a function, got {entry!r}.")
     if name in BUILT_IN:
-        raise ConfigError(f"There is the {table.kind} {name!r} already; choose another name.")
+        raise ConfigError(f"The {table.kind} {name!r} exists already; choose another name.")
     table.register(name, entry)
 
 
 ADVICE = {
-    "task": "Register the task (hrc_env.register_task) and give its id.",
-    "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
-    "shield": "Register the shield (hrc_env.register_shield) and give its name.",
+    "task": "Register the task (hrc_env.register_task) and pass its id.",
+    "estimator": "Register the estimator (hrc_env.register_estimator) and pass its name.",
+    "shield": "Register the shield (hrc_env.register_shield) and pass its name.",
 }
 """Advice in errors about arguments that cannot be stored as JSON, by name."""
 OTHERWISE = (
-    "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
-    "file (hrc_env.save_clip writes one)."
+    "Pass text, numbers, or lists, records or mappings of these; for a clip in memory, the path of "
+    "its file (hrc_env.save_clip writes one)."
 )
 """Advice in errors about all other arguments that cannot be stored as JSON."""
 

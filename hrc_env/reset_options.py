@@ -125,8 +125,8 @@ def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[
     for name in (*ONE_RESET, *more):
         if name in given and name != "each":
             raise ConfigError(
-                f"{name} is of one reset: give it to reset(options=...). set_options(...) is for "
-                "all resets to come."
+                f"{name} applies to a single reset: pass it to reset(options=...). "
+                "set_options(...) applies to all later resets."
             )
     return given
 
@@ -219,8 +219,9 @@ def fix(options: Options, room: Room) -> Fixed:
     if room.images is not None and rig is not None:
         if room.level not in CAMERA_LEVELS:
             raise ConfigError(
-                'options["cameras"] are of a perception level with cameras; at perception='
-                f"{room.level!r} images show the rig with which the environment was made."
+                'options["cameras"] requires a perception level with cameras; with '
+                f"perception={room.level!r}, images show the rig with which the environment was "
+                "created."
             )
         room.images.check(rig if rigs is None else rigs.possible(rig))
     if faults is not None:
@@ -263,14 +264,14 @@ def _start_q(start_q: Any, room: Room) -> JointAngles | None:
         q = np.array(start_q, float)
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{name} must be numbers, got {start_q!r}.") from error
-    check_shape(name, q.shape, (room.chain.n_joints,), f"one a joint: {', '.join(joints)}")
+    check_shape(name, q.shape, (room.chain.n_joints,), f"one entry per joint: {', '.join(joints)}")
     for value, (low, high), joint in zip(q, room.chain.range_rad, joints, strict=True):
         if not low <= value <= high:
             raise ConfigError(
                 f"{name}: joint {joint!r} must be from {low:.3f} to {high:.3f}, got {value:.3f}."
             )
     if touched := room.find_contact(q):
-        raise ConfigError(f"{name}: with these angles {touched} touch; choose others.")
+        raise ConfigError(f"{name}: with these angles, {touched} touch; choose other angles.")
     return q
 
 
@@ -284,7 +285,7 @@ def _cast(given: Options, room: Room) -> Cast | None:
             n = check_integer('options["n_workers"]', given["n_workers"], 0, most)
         except ConfigError as error:
             raise ConfigError(
-                f"{error} The environment was made for {most}: make it with "
+                f"{error} The environment was created for {most}: create it with "
                 "n_workers=(fewest, most) for more."
             ) from error
     count = most if n is None else n
@@ -355,9 +356,10 @@ def _rig(cameras: Any, room: Room) -> ChosenRig:
     for camera in rig:
         if camera.name not in names:
             raise ConfigError(
-                f'options["cameras"]: the cameras of an episode must be called as those that the '
-                f"environment was made with, {', '.join(names)}, which infos name; got "
-                f"{camera.name!r}. Make the environment with cameras= of all of them."
+                'options["cameras"]: the cameras of an episode must have names of those with which '
+                f"the environment was created, {', '.join(names)}, which are part of info keys; "
+                f"got {camera.name!r}. Create the environment with cameras= that contains all of "
+                "them."
             )
     if rigs is None and room.level in CAMERA_LEVELS:
         for defect in describe_defects(with_rig(room.scene, rig), room.wants_pairs):

@@ -140,9 +140,9 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
     ),
     RewardTerm(
         "proximity",
-        "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
-        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; the square "
-        "counts as at least `unknown_closeness` while a worker is unknown.",
+        "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance between "
+        "the robot's surface and the closest estimated body and d0 is `proximity_reach_m`; while a "
+        "worker is unknown, the squared term is at least `unknown_closeness`.",
         _proximity,
     ),
 )
@@ -187,7 +187,7 @@ def check_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> 
         number = isinstance(factor, int | float | np.number) and not isinstance(factor, bool)
         if not number or not np.isfinite(factor):
             raise ConfigError(
-                f"The factor on reward term {name!r} must be a finite number, got {factor!r}."
+                f"The factor of reward term {name!r} must be a finite number, got {factor!r}."
             )
     return {name: float(factor) for name, factor in factors.items()}
 
@@ -205,7 +205,7 @@ def sum_terms(terms: Mapping[str, Floats], batch: int) -> Floats:
             fault of a camera.
     """
     for name, value in terms.items():
-        check_shape(f"reward term {name!r}", np.shape(value), (batch,), "a value an environment")
+        check_shape(f"reward term {name!r}", np.shape(value), (batch,), "one value per environment")
     reward: Floats = sum(terms.values(), np.zeros(batch))
     if not np.isfinite(reward).all():
         wrong = [name for name, value in terms.items() if not np.isfinite(value).all()]

@@ -197,7 +197,7 @@ class HRCVecEnv(VecEnv):
         """
         if self.render_mode != "rgb_array":
             warnings.warn(
-                f"Images take render_mode='rgb_array', this one is {self.render_mode!r}.",
+                f"Images require render_mode='rgb_array', but this one is {self.render_mode!r}.",
                 stacklevel=2,
             )
             return [None] * self.num_envs
@@ -233,7 +233,8 @@ class HRCVecEnv(VecEnv):
             return [method(*method_args, **method_kwargs) for method in methods]
         if set(chosen) != set(range(self.num_envs)):
             raise ConfigError(
-                f"{method_name}() is for all environments together: leave out indices={indices}."
+                f"{method_name}() applies to all environments together: leave out "
+                f"indices={indices}."
             )
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * len(chosen)
 
@@ -328,7 +329,7 @@ class HRCSubprocVecEnv(SubprocVecEnv):
 def _one_each(options: Any, num_envs: int) -> Sequence[Any]:
     """Return a list with the options of each environment, given a common mapping or such a list."""
     each = options if isinstance(options, (list, tuple)) else [options] * num_envs
-    check_shape("options", (len(each),), (num_envs,), "a mapping for each environment")
+    check_shape("options", (len(each),), (num_envs,), "one mapping per environment")
     return each
 
 

@@ -128,14 +128,14 @@ def make_settings(asked: EnvConfig) -> Settings:
     if task.needs_gripper and not robot.grips:
         able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
-            f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
+            f"{task.id} needs a robot with a hand, but {robot.name!r} has none; valid are "
             f"{', '.join(map(repr, able))}."
         )
     if task.needs_mobile_base != robot.drives:
         able = [name for name, each in ROBOTS.items() if each.drives == task.needs_mobile_base]
-        kind = "a robot that drives" if task.needs_mobile_base else "an arm on the pedestal"
+        kind = "a mobile robot" if task.needs_mobile_base else "an arm on the pedestal"
         raise ConfigError(
-            f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
+            f"{task.id} needs {kind}, which {robot.name!r} is not; valid are "
             f"{', '.join(map(repr, able))}."
         )
     scene = task.scene if asked.scene is None else asked.scene
@@ -163,8 +163,9 @@ def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
         if cameras in RIGS:
             return RIGS[str(cameras)]
         raise ConfigError(
-            f"cameras={cameras!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
-            "ends in .toml, a list of names, indices, places or cameras, or a RigDistribution."
+            f"cameras={cameras!r} is not a rig: valid are {', '.join(map(repr, RIGS))}, a path "
+            "that ends in .toml, a list of names, indices, positions or cameras, or a "
+            "RigDistribution."
         )
     several = isinstance(cameras, Sequence)
     if not several or all(isinstance(each, str | int | float | np.number) for each in cameras):
@@ -181,8 +182,8 @@ def _camera(given: Any, index: int) -> CameraConfig:
     place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
     if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
         raise ConfigError(
-            "cameras must be names and indices of the scene's cameras, or else places (x, y, z) "
-            f"[m] and CameraConfigs of a rig of your own; got {given!r} among them."
+            "cameras must be names and indices of the scene's cameras, or positions (x, y, z) [m] "
+            f"and CameraConfigs of a custom rig; got {given!r} among them."
         )
     x, y, z = (float(value) for value in place)
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
@@ -194,8 +195,8 @@ def _parse_worker_counts(n_workers: int | tuple[int, int]) -> WorkerCounts:
     are_whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
     if not are_whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
         raise ConfigError(
-            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
-            f"episode's number is drawn, got {n_workers!r}."
+            "n_workers must be a whole number, 0 or more, or (fewest, most), from which the number "
+            f"is drawn in each episode, got {n_workers!r}."
         )
     return WorkerCounts(int(pair[0]), int(pair[1]))
 

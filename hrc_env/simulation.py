@@ -135,7 +135,7 @@ class Simulation(Stateful):
         targets = [*self.task.reach_targets(), *object_targets(self.scene)]
         check_reach(self.task.id, self.scene.robot.name, self.chain, targets)
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
-        check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
+        check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one entry per joint")
         self._grips = settings.robot.grips
         self.n_actions = n_actions(self.control, self.chain, self._grips)
         n_slides = int(self.chain.slides.sum())
@@ -245,7 +245,7 @@ class Simulation(Stateful):
         """
         if not isinstance(weights, RewardConfig | None):
             raise ConfigError(
-                f"weights must be a RewardConfig, got {weights!r}; factors on terms by name are "
+                f"weights must be a RewardConfig, got {weights!r}; to scale terms by name, use "
                 'set_reward(factors={"NAME": 2.0}).'
             )
         checked = (
@@ -273,8 +273,8 @@ class Simulation(Stateful):
             taken, value = state["settings"].get(name), self.settings.get(name)
             if taken != value:
                 raise ConfigError(
-                    f"The state was taken with {name}={taken!r}; "
-                    f"here {name} is {value!r}. Make the environment with the same arguments."
+                    f"The state was taken with {name}={taken!r}, but here {name} is {value!r}. "
+                    "Create the environment with the same arguments."
                 )
         super().set_state(state)
         self.reward_factors = dict(state.get("reward_factors", {}))
@@ -525,7 +525,7 @@ class Simulation(Stateful):
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
         """Compute cost and metrics from the true state, reward and observation from the belief."""
-        config, paths = self.config, require(truth.paths, "A step's paths")
+        config, paths = self.config, require(truth.paths, "The true paths of a step")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)
@@ -551,7 +551,7 @@ class Simulation(Stateful):
         over = np.asarray(self.task.is_terminal(task_step))
         if over.ndim:
             name = f"{self.task.id}: is_terminal"
-            check_shape(name, over.shape, (self.batch,), "one an environment")
+            check_shape(name, over.shape, (self.batch,), "one entry per environment")
         return over.astype(bool)
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
@@ -559,7 +559,7 @@ class Simulation(Stateful):
         rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
-        check_shape(f"{self.task.id}: draw_start", np.shape(q), expected, "an angle a joint")
+        check_shape(f"{self.task.id}: draw_start", np.shape(q), expected, "one angle per joint")
         q = np.array(q) if given else q
         for row, b in enumerate(ids.tolist() if given else ()):
             if b in given and given[b].start_q is not None:

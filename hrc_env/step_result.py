@@ -49,9 +49,9 @@ def check_keys(keys: list[str], info: Info) -> Info:
     if list(info) != keys and info.keys() != set(keys):
         came, gone = sorted(info.keys() - set(keys)), sorted(set(keys) - info.keys())
         raise ConfigError(
-            "Infos must have the same keys at every reset and step: those of a shield and of a "
-            f"task need the same names each time. New: {', '.join(came) or 'none'}; "
-            f"missing: {', '.join(gone) or 'none'}. Give NaN where there is no number."
+            "Infos must have the same keys at every reset and step: a shield and a task must "
+            f"return the same names each time. New: {', '.join(came) or 'none'}; missing: "
+            f"{', '.join(gone) or 'none'}. Use NaN for missing numbers."
         )
     return info
 

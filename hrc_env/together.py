@@ -17,8 +17,8 @@ SEEDS = (0, 1)
 N_STEPS = 4
 """Number of control steps after each reset and each restored state."""
 RULE = (
-    "All methods work on rows: of environment b draw from rngs[b], write and return the rows of "
-    "`ids` only, and take no sum, mean or greatest value over the first axis."
+    "All methods work on rows: draw random numbers for environment b from rngs[b], write and "
+    "return only the rows of `ids`, and do not reduce (sum, mean, maximum) over the first axis."
 )
 Numbers = dict[str, Any]
 """Type of the arrays (B, ...) of a result, by name."""
@@ -37,8 +37,8 @@ def check_rows(settings: Settings) -> None:
             beside = {name: value[row] for name, value in several.items()}
             if wrong := _find_difference({name: value[0] for name, value in alone.items()}, beside):
                 raise ConfigError(
-                    f"{settings.task.id}: {wrong} of an environment is another one beside others "
-                    f"than alone. {RULE}"
+                    f"{settings.task.id}: {wrong} of an environment differs between a batch and a "
+                    f"single environment. {RULE}"
                 )
 
 
@@ -50,8 +50,8 @@ def _collect(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
             return list(_play(settings, seeds))
         except (ValueError, IndexError, TypeError) as error:
             raise ConfigError(
-                f"{settings.task.id} fails with {len(seeds)} of its environments, or at the reset "
-                f"of one of them: {type(error).__name__}: {error}. {RULE}"
+                f"{settings.task.id} fails with a batch of {len(seeds)} environments, or at the "
+                f"reset of one of them: {type(error).__name__}: {error}. {RULE}"
             ) from error
 
 
@@ -78,9 +78,10 @@ def _play(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
         for before, after in zip(first, steps(), strict=True):
             if wrong := _find_difference(before, after):
                 raise ConfigError(
-                    f"{settings.task.id}: {wrong} is another one when an environment goes on from "
-                    "a state again. All that changes must be in the state that make_state "
-                    "returns, nothing in self, and all chance in rngs."
+                    f"{settings.task.id}: {wrong} differs when an environment continues from the "
+                    "same state again. Everything that changes must be in the state that "
+                    "make_state returns, nothing in self, and all random numbers must come from "
+                    "rngs."
                 )
             yield after
         again: dict[int, Numbers] = {}

@@ -98,7 +98,7 @@ BAD = {
         {"id": "HRCTend-v1", "markers": None},
         "markers must be a method",
     ),
-    "an id that is taken": ({}, "There is the task 'HRCTend-v0' already"),
+    "an id that is taken": ({}, "The task 'HRCTend-v0' exists already"),
     "an id that is none": ({"id": "tend"}, "must be like"),
     "no function": ({"id": "HRCTend-v1", "advance": None}, "advance must be a method"),
     "settings without defaults": (
@@ -107,7 +107,7 @@ BAD = {
     ),
     "a term that is taken": (
         {"id": "HRCTend-v1", "rewards": hrc_env.rewards.SHARED_TERMS[:1]},
-        "term 'effort' already",
+        "term 'effort' exists already",
     ),
     "an info that lacks a count": (
         {"id": "HRCTend-v1", "achieved": "task/screws"},
@@ -156,7 +156,7 @@ def test_one_entry_of_one_environment_that_is_no_number_is_enough():
         seen[-1, 1] = np.nan
         return seen
 
-    with pytest.raises(FloatingPointError, match=r"not a number: station\.$"):
+    with pytest.raises(FloatingPointError, match=r"not finite numbers: station\.$"):
         HRCVectorEnv(2, task=vary(TASKS[TASK], view=view), perception="none")
 
 
@@ -219,9 +219,9 @@ def test_a_function_that_makes_an_estimator_is_one():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "There is the estimator 'dlt_kalman' already"),
+        ({}, "The estimator 'dlt_kalman' exists already"),
         ({"make": lambda P, dt_s, config: object()}, "lacks init, reset, predict"),
-        ({"config": dict}, "must be a kind of TrackerConfig"),
+        ({"config": dict}, "must be a subclass of TrackerConfig"),
         ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),
         (
             {"make": lambda *given: Wrong(*given, np.zeros(7))},
@@ -308,12 +308,12 @@ def stepped(**arguments):
 @pytest.mark.parametrize(
     ("register", "given", "said"),
     [
-        (hrc_env.register_shield, ("slow_down", print), "the shield 'slow_down' already"),
+        (hrc_env.register_shield, ("slow_down", print), "shield 'slow_down' exists already"),
         (hrc_env.register_shield, ("other", None), "must be a function"),
         (
             hrc_env.register_detector,
             ("mirrored", print),
-            "the detector 'mirrored' already",
+            "detector 'mirrored' exists already",
         ),
         (hrc_env.register_detector, ("other", None), "must be a function"),
     ],
@@ -427,17 +427,17 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "the robot 'swing_arm' already"),
+        ({}, "robot 'swing_arm' exists already"),
         ({"mjcf": "<mujoco><"}, "cannot be used"),
         ({"mjcf": "nowhere.xml"}, "cannot be used"),
         ({"tool_site": "top"}, "no site 'top'"),
         ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
-        ({"joints": ("lift", "turn", "bend")}, "in its order"),
+        ({"joints": ("lift", "turn", "bend")}, "in the same order"),
         ({"capsules": ("turret", "boom", "claw")}, "no geom 'claw'"),
         ({"watched_capsules": ("jip",)}, "Did you mean 'jib'"),
         ({"home_q": (0.0, 0.6)}, "home_q must be 3 angles"),
         ({"home_q": (0.0, 0.6, np.nan)}, "home_q must be 3 angles"),
-        ({"home_q": (3.0, 0.6, 1.2)}, "outside of the joints' ranges"),
+        ({"home_q": (3.0, 0.6, 1.2)}, "outside the joints' ranges"),
         ({"mjcf": lambda text: text.replace(SERVO, "")}, "needs an <intvelocity>"),
         ({"mjcf": lambda text: re.sub('capsule(" size=".05)', r"cylinder\1", text)},
          "must be a capsule"),

@@ -190,8 +190,8 @@ def test_another_program_may_register_the_same_names(script, tmp_path):
             lock = threading.Lock()
             hrc_env.register_shield("odd", lambda *given: lock and slower(*given))
             """,
-            "The shield 'odd' was registered in the process that started this one and cannot be "
-            "brought here (TypeError: cannot pickle '_thread.lock' object).",
+            "The shield 'odd' was registered in the parent process and cannot be transferred to "
+            "this one (TypeError: cannot pickle '_thread.lock' object).",
         ),
         (
             """
@@ -252,5 +252,5 @@ def test_a_snapshot_in_a_folder_of_others_is_not_read(process, tmp_path):
         HRC_ENV_REGISTERED=str(tmp_path / "snapshot.pickle"),
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "its folder must belong to this user" in done.stderr
+    assert "its folder must be owned by this user" in done.stderr
     assert not (tmp_path / "opened").exists()

@@ -64,7 +64,7 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
     clip = object.__new__(Clip)
     object.__setattr__(clip, "source", "walk")
     config = replace(HRCConfig(), motion=replace(HRCConfig().motion, motions=(clip,)))
-    with pytest.raises(ConfigError, match="'walk' cannot be written: give its file"):
+    with pytest.raises(ConfigError, match="'walk' is held in memory and cannot be written"):
         save_config(config, tmp_path / "mine.toml")
     assert list(tmp_path.iterdir()) == []
 
@@ -74,7 +74,7 @@ def test_a_clip_in_memory_is_not_written(tmp_path):
     [
         ("[reward]\nproximty = 1\n", "'reward.proximty'. Did you mean 'reward.proximity'"),
         ('ctrl_dt = "fast"\n', "ctrl_dt must be a finite number, got 'fast'"),
-        ("reward = [", "must be TOML"),
+        ("reward = [", "is not valid TOML"),
         ('[motion]\npeople = "hurrid"\n', "motion.people 'hurrid'. Did you mean 'hurried'"),
         ("appearance = 3\n", "appearance must be a name ('as_built'"),
         ('[motion]\njobs = "lowwork"\n', "motion.jobs 'lowwork'. Did you mean 'low_work'"),
@@ -147,7 +147,7 @@ def test_a_setting_that_there_is_not_is_answered_with_the_nearest():
     ("text", "said"),
     [
         ("percepton = 3\n", "'percepton'. Did you mean 'perception'"),
-        ("[task]\nradius_m = 0.1\n", r"its settings are \[config.task\]"),
+        ("[task]\nradius_m = 0.1\n", r"settings of the task belong in \[config.task\]"),
         ("people = 'hurrid'\n", "Did you mean 'hurried'"),
         ("[shield]\nknd = 'qp'\n", "Did you mean 'shield.kind'"),
     ],

@@ -299,7 +299,7 @@ def test_a_config_survives_the_spec(config):
 
 @pytest.mark.parametrize("n_workers", [12, 36, 10**9, (0, 36)])
 def test_more_workers_than_there_is_room_for_are_refused_with_how_many_fit(n_workers):
-    with pytest.raises(ConfigError, match="no more than 11 fit on these grounds"):
+    with pytest.raises(ConfigError, match="at most 11 fit into this scene"):
         HRCEnv(perception="none", n_workers=n_workers)
 
 
@@ -339,7 +339,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"config": {"scene": {"cameras": [{"name": "a"}]}}}, "eye_world is missing"),
         ({"config": {"control": {"tool_speed_m_s": -1.0}}}, "tool_speed_m_s must be positive"),
         ({"config": {"start_spread_rad": [1.0, 2.0]}}, "start_spread_rad must have shape"),
-        ({"cameras": "camera_1"}, "is no rig.*list of names, indices"),
+        ({"cameras": "camera_1"}, "is not a rig.*list of names, indices"),
         ({"cameras": [0.5]}, "Camera index .* 0 to 3, got 0.5"),
         ({"cameras": [True]}, "Camera index .* 0 to 3, got True"),
         ({"cameras": 0}, "list of names or indices"),

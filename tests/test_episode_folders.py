@@ -79,7 +79,7 @@ def test_a_set_is_a_sequence(whole):
     assert len(whole) == len(list(whole)) == 3
     assert [each.seed for each in whole[1:]] == [8, 9]
     assert whole[-1].seed == 9
-    with pytest.raises(IndexError, match="There are 3 episodes"):
+    with pytest.raises(IndexError, match="has 3 episodes"):
         whole[3]
 
 
@@ -172,10 +172,10 @@ BAD = {
     "images of 10,000 pixels": (
         ["--observe-images", "84", "10000"], "width of images [px] must be"),
     "images for which there is no memory": (
-        ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are held in memory"),
+        ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are kept in memory"),
     "keypoints without cameras": (
         ["--keypoints", "--perception", "truth"], "--perception truth has none"),
-    "two places": (["--out", "hrc/reach-v0"], "A data set needs one place"),
+    "two places": (["--out", "hrc/reach-v0"], "A data set needs exactly one destination"),
 }  # fmt: skip
 
 
@@ -190,13 +190,13 @@ def test_what_cannot_be_recorded_is_refused_before_an_episode(name, tmp_path):
 
 def test_a_place_is_needed_and_must_be_free(tmp_path):
     done = hrc("record", "HRCReach-v0")
-    assert "A data set needs one place" in said(done)
+    assert "A data set needs exactly one destination" in said(done)
     assert "exists already" in said(record(tmp_path))
 
 
 def test_what_is_no_data_set_is_refused_in_words(tmp_path):
     for content, expected in (
-        (None, "is no folder of recorded episodes"),
+        (None, "is not a folder of recorded episodes"),
         ("{", "cannot be read"),
         ("{}", "cannot be read: KeyError"),
         (json.dumps({"format": 9, "hrc_env": "9.0"}), "has format 9"),

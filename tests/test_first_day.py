@@ -109,7 +109,7 @@ def test_actions_of_another_control_are_told_from_those_of_this_one(tmp_path):
     name = str(tmp_path / "plain.zip")
     assert find_control(name) == "twist"
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
-    with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
+    with pytest.raises(CheckpointError, match=r"uses control='twist'.*--control twist"):
         hrc_env.make_agent(name, joint)
     twist = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none", control="twist"))
     assert hrc_env.make_agent(name, twist).act(np.zeros((2, *twist.layout.low.shape))).shape == (
@@ -124,7 +124,7 @@ def test_a_checkpoint_of_train_tells_its_control(tmp_path):
     checkpoints.save(PPO("MlpPolicy", env, n_steps=8), tmp_path / "ours.zip", facts)
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
     for load in (checkpoints.load, acting.load):
-        with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
+        with pytest.raises(CheckpointError, match=r"uses control='twist'.*--control twist"):
             load(tmp_path / "ours.zip", joint)
 
 
@@ -174,12 +174,12 @@ def shielded(shield):
 
 @pytest.mark.parametrize("name", ["active", "change", "scale"])
 def test_a_shield_says_nothing_that_is_measured_of_all(name):
-    with pytest.raises(hrc_env.ConfigError, match=f"must not return a value '{name}'"):
+    with pytest.raises(hrc_env.ConfigError, match=f"must not return the value '{name}'"):
         shielded(lambda now, velocities, dt_s: (velocities, {name: np.ones(len(velocities))}))
 
 
 def test_a_shield_that_is_faster_than_joints_can_be_is_warned_of():
-    with pytest.warns(UserWarning, match=r"lets joint \d go .* times as fast as it can"):
+    with pytest.warns(UserWarning, match=r"lets joint \d move at .* times its velocity limit"):
         shielded(lambda now, velocities, dt_s: (velocities * 100, {}))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -258,7 +258,7 @@ def test_joints_that_are_no_arms_are_named():
 @pytest.mark.parametrize("render_mode", [None, "depth_array"])
 def test_an_overlay_that_nothing_shows_is_warned_of(render_mode):
     made = {"perception": "none", "overlay": "capsules"}
-    with pytest.warns(UserWarning, match="is drawn in pictures of render_mode='rgb_array' only"):
+    with pytest.warns(UserWarning, match="requires render_mode='rgb_array'"):
         hrc_env.HRCVectorEnv(1, render_mode=render_mode, **made).close()
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -172,12 +172,12 @@ def test_a_run_with_a_limit_resumes(run):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--cost-limit", "30"], "needs ppo_lagrangian, and ppo ignores cost"),
+        (["--cost-limit", "30"], "requires ppo_lagrangian, and ppo ignores cost"),
         (["--algorithm", "sac", "--cost-limit", "30"], "and sac ignores cost"),
         ([*LIMITED[:3], "-3"], "--cost-limit must be above 0, got -3"),
-        ([*LIMITED[:3], "0"], "A shield brings the cost"),
+        ([*LIMITED[:3], "0"], "A shield reduces the cost"),
         ([*LIMITED[:3], "nan"], "--cost-limit must be above 0"),
-        (LIMITED[:2], "needs a limit, as --cost-limit 30"),
+        (LIMITED[:2], "requires a limit, for example --cost-limit 30"),
         (["--shield", "sm"], "Unknown shield 'sm'"),
     ],
 )

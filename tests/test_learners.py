@@ -95,7 +95,7 @@ def test_a_policy_for_goals_acts_where_there_are_goals_only(run):
     env = HRCEnv(REACH, perception="truth", n_workers=0, control="tool")
     action = agent.act(env.reset(seed=0)[0])
     assert action.shape == (3,)
-    with pytest.raises(CheckpointError, match="make it with the same task"):
+    with pytest.raises(CheckpointError, match="create it with the same task"):
         make_agent(str(run / "policy.zip"), told("HRCReach-v0"))
 
 
@@ -115,7 +115,7 @@ def test_hindsight_is_for_goals():
     ("words", "says"),
     [
         (["--algorithm", "sac", "--her", "True"], "HRCReach-v0 has no goals apart from"),
-        (["--her", "True"], "ppo has no such buffer"),
+        (["--her", "True"], "ppo has no replay buffer"),
         (["--algorithm", "scac"], "Did you mean 'sac'"),
         (["--demonstrations", "-1"], "--demonstrations must be 0 or more"),
         (["--timesteps", "0"], "--timesteps must be 1 or more"),

@@ -61,7 +61,10 @@ ESTIMATOR_FAULTS: dict[str, tuple[EstimatorSpec, str]] = {
     "no estimate": (estimator("estimate", lambda self, state: None), "a PoseEstimate, got None"),
     "no forecast": (estimator("forecast", lambda self, s, h: None), "a PoseEstimate, got None"),
     "shape": (estimator("estimate", without_ages), "estimate.age_s must have shape"),
-    "rows": (estimator("init", lambda self, b, w: np.zeros((w + 5, b))), "must begin with (B, W)"),
+    "rows": (
+        estimator("init", lambda self, b, w: np.zeros((w + 5, b))),
+        "must have leading axes (B, W)",
+    ),
 }
 
 
@@ -145,7 +148,7 @@ def test_functions_of_terms_and_goals_are_checked_when_they_are_made() -> None:
 
 
 SHIELD_FAULTS = {
-    "nothing": (lambda belief, velocities, dt_s: None, "must return two things"),
+    "nothing": (lambda belief, velocities, dt_s: None, "must return a pair"),
     "shape": (lambda belief, velocities, dt_s: (velocities[:, :2], {}), "velocities must have"),
     "values": (
         lambda belief, velocities, dt_s: (velocities, {"a": np.zeros(7)}),

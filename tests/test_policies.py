@@ -159,7 +159,7 @@ def test_an_address_is_a_file_of_the_package(exported, tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match="'hrc://HRCReach-v0/tiny'"):
         make_agent("hrc://HRCReach-v0/../../x", here())
     monkeypatch.setattr(policies, "FOLDER", tmp_path)
-    with pytest.raises(ConfigError, match="The package has no policies yet"):
+    with pytest.raises(ConfigError, match="The package contains no policies yet"):
         make_agent("hrc://HRCReach-v0/tiny", here())
 
 
@@ -187,7 +187,9 @@ def test_another_order_or_scale_of_terms_is_refused(exported):
     card, info = policies.read(exported)[0], here()
     assert policies.list_differences(card, info) == []
     turned = replace(card, observation=card.observation[::-1])
-    assert policies.list_differences(turned, info) == ["its observation's terms have another order"]
+    assert policies.list_differences(turned, info) == [
+        "the terms of its observation have a different order"
+    ]
     finer = replace(card.observation[0], scale=0.5), *card.observation[1:]
     (said,) = policies.list_differences(replace(card, observation=finer), info)
     assert "6 entries of 0.5, here 6 entries of 1" in said
@@ -197,7 +199,7 @@ def test_a_damaged_file_is_refused(own):
     content = bytearray(own.read_bytes())
     content[-1] ^= 1
     own.write_bytes(content)
-    with pytest.raises(CheckpointError, match="is damaged, or does not belong to its card"):
+    with pytest.raises(CheckpointError, match="is damaged or does not belong to its model card"):
         make_agent(str(own), here())
 
 
@@ -209,7 +211,7 @@ def test_a_pickled_file_is_not_read(own, run):
     for content in (pickle.dumps(Bad()), (run / "policy.zip").read_bytes()):
         own.write_bytes(content)
         with pytest.raises(
-            CheckpointError, match="is a pickled file, which could execute anything"
+            CheckpointError, match="is a pickle, which could execute arbitrary code"
         ):
             make_agent(str(own), here())
 
@@ -229,7 +231,9 @@ def test_files_that_are_no_policies_say_so(own, tmp_path):
         with pytest.raises(CheckpointError, match=says):
             make_agent(str(own), here())
     spoil(own, n_actions="six")
-    with pytest.raises(CheckpointError, match="is no card of a policy: Config field n_actions"):
+    with pytest.raises(
+        CheckpointError, match="is not a model card of a policy: Config field n_actions"
+    ):
         make_agent(str(own), here())
     own.with_suffix(".json").unlink()
     with pytest.raises(CheckpointError, match=r"No .*tiny\.json"):
@@ -244,8 +248,8 @@ def test_an_activation_that_nobody_knows_is_refused():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["RUN", "--name", "Tiny"], "takes small letters, digits and _"),
-        (["RUN", "--name", "tiny"], "exists already; give another --name"),
+        (["RUN", "--name", "Tiny"], "must consist of lowercase letters, digits and _"),
+        (["RUN", "--name", "tiny"], "exists already; choose another --name"),
         (["nowhere", "--name", "tiny"], "holds no run"),
         (["RUN", "--name", "tiny", "--episodes", "0"], "--episodes must be 1 or more"),
         (["RUN", "--name", "other", "--shields", "qq"], "Unknown shield 'qq'"),

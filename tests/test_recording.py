@@ -140,7 +140,7 @@ def test_without_minari_it_says_what_to_type(monkeypatch, capsys):
 
 def test_pictures_are_not_recorded(capsys):
     assert record("HRCReach-v0", "--perception", "pixels") == 2
-    assert "record keypoints" in " ".join(capsys.readouterr().err.split())
+    assert "use --perception keypoints" in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_environment_comes_back_with_its_arguments():

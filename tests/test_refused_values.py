@@ -131,7 +131,7 @@ def test_a_term_with_other_entries_than_it_says_is_told(name, n_first, n_second)
 def test_one_entry_that_is_no_number_is_told_with_its_term(at, said):
     physical = np.zeros((2, 3))
     physical[at] = np.nan
-    with pytest.raises(FloatingPointError, match=rf"not a number: {said}\.$"):
+    with pytest.raises(FloatingPointError, match=rf"not finite numbers: {said}\.$"):
         seen(physical[:, :1], physical[:, 1:])
 
 
@@ -180,10 +180,10 @@ def test_images_may_look_different_and_have_faults(monkeypatch, changes):
 @pytest.mark.parametrize(
     ("level", "changes", "said"),
     [
-        *((level, {"appearance": AppearanceConfig(hat=0.5)}, "Looks are of images")
+        *((level, {"appearance": AppearanceConfig(hat=0.5)}, "Appearances need images")
           for level in LEVELS[1:]),
-        *((level, {"faults": (TIMING,)}, "Faults are of cameras") for level in LEVELS[2:]),
-        *((level, {"faults": (IMAGE,)}, "Faults are of cameras") for level in LEVELS[2:]),
+        *((level, {"faults": (TIMING,)}, "Faults need cameras") for level in LEVELS[2:]),
+        *((level, {"faults": (IMAGE,)}, "Faults need cameras") for level in LEVELS[2:]),
         ("keypoints", {"faults": (TIMING, IMAGE)}, r"Faults of images \(noise\) need images"),
         ("keypoints", {"faults": (FaultConfig("late", ("c",)),)}, "Unknown camera of fault"),
         ("pixel", {}, "Unknown perception 'pixel'"),

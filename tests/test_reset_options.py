@@ -307,8 +307,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"people": "unawar"}, "Did you mean 'unaware'"),
     ({"activity": "hamer"}, "Did you mean 'hammer'"),
     ({"activity": "walk"}, "Valid: "),
-    ({"n_workers": 2, "activity": "saw"}, "fewer free places"),
-    ({"start_q": [0.0] * 5}, "one a joint"),
+    ({"n_workers": 2, "activity": "saw"}, "fewer free positions"),
+    ({"start_q": [0.0] * 5}, "one entry per joint"),
     ({"start_q": [9.0] * 6}, "joint 'shoulder_pan' must be from"),
     ({"start_q": [0.0, 1.5, 0.0, 0.0, 0.0, 0.0]}, "touch"),
     ({"cameras": ["camera_9"]}, "Did you mean"),
@@ -321,7 +321,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"faults": [{**LATE, "amount": [0.0, 3.0]}]}, "must be from 0 to 1 s"),
     ({"faults": [{**LATE, "amount": [0.0, 0.1, 0.2]}]}, "(least, most)"),
     ({"faults": [{"kind": "noise", "cameras": ["all"]}]}, "need images"),
-    ({"appearance": "varied"}, "Looks are of images"),
+    ({"appearance": "varied"}, "Appearances need images"),
     ({"steps_left": 0}, "steps_left"),
 ]
 
@@ -341,9 +341,9 @@ def test_options_that_cannot_be_are_refused_in_words(options: dict, words: str) 
 
 @pytest.mark.parametrize(("options", "words"), [
     ({"each": [{}]}, "a list of 2 mappings"),
-    ({"each": [{"goal": GOAL}, None], "goal": GOAL}, "give it once"),
+    ({"each": [{"goal": GOAL}, None], "goal": GOAL}, "give it only once"),
     ({"goal": [GOAL] * 3}, "(2,)"),
-    ({"steps_left": 3, "elapsed_steps": 3}, "give one of them"),
+    ({"steps_left": 3, "elapsed_steps": 3}, "give only one of them"),
 ])  # fmt: skip
 def test_a_vector_refuses_options_that_exclude_each_other(options: dict, words: str) -> None:
     envs = HRCVectorEnv(2, num_threads=1, perception="truth")
@@ -434,7 +434,7 @@ def test_images_are_of_the_rig_of_the_episode() -> None:
 @pytest.mark.usefixtures("pixels")
 def test_images_take_a_lens_where_the_environment_was_made_for_lenses() -> None:
     lenses = RigDistribution(lenses=(GOPRO,))
-    with pytest.raises(ConfigError, match="was made to observe images of cameras without"):
+    with pytest.raises(ConfigError, match="was created to observe images of cameras without"):
         make(observe_images=(32, 32)).reset(seed=1, options={"cameras": lenses})
     env = make(observe_images=(32, 32), cameras=lenses)
     seen, _ = env.reset(seed=1)
@@ -443,7 +443,7 @@ def test_images_take_a_lens_where_the_environment_was_made_for_lenses() -> None:
 
 def test_images_show_no_other_rig_where_nothing_looks_through_cameras(pixels) -> None:
     env = make(perception="truth", observe_images=(32, 32))
-    with pytest.raises(ConfigError, match="are of a perception level with cameras"):
+    with pytest.raises(ConfigError, match="requires a perception level with cameras"):
         env.reset(seed=1, options={"cameras": ["camera_1"]})
 
 
@@ -458,5 +458,5 @@ def test_drawn_cameras_hang_in_the_room() -> None:
 
 def test_where_images_would_show_a_rig_that_is_not_drawn_it_is_refused() -> None:
     drawn = RigDistribution(max_shift_m=0.1)
-    with pytest.raises(ConfigError, match="at perception='truth' no rig is drawn"):
+    with pytest.raises(ConfigError, match="with perception='truth' no rig is drawn"):
         make(perception="truth", observe_images=(32, 32), cameras=drawn)

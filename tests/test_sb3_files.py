@@ -150,7 +150,7 @@ def test_the_trap_of_these_tests_works(tmp_path):
 def test_a_network_of_ones_own_wants_trust(tmp_path):
     path, mark = saved(tmp_path, features_extractor_class=Own), tmp_path / "mark"
     with pytest.raises(
-        CheckpointError, match=r"features_extractor_class .*Own.*run arbitrary code.*--trust"
+        CheckpointError, match=r"features_extractor_class .*Own.*execute arbitrary code.*--trust"
     ):
         make_agent(str(path), here())
     model = PPO.load(path, device="cpu")
@@ -182,7 +182,7 @@ def test_a_policy_that_only_claims_to_be_known_wants_trust(named, tmp_path):
 def test_weights_that_are_more_than_weights_are_refused_even_with_trust(tmp_path):
     mark = tmp_path / "mark"
     path = rewritten(saved(tmp_path), lambda data: None, **{"policy.pth": pickle.dumps(Trap(mark))})
-    with pytest.raises(CheckpointError, match="more than weights"):
+    with pytest.raises(CheckpointError, match="other objects besides weights"):
         make_agent(str(path), here(), trust=True)
     assert not mark.exists()
 
@@ -193,14 +193,14 @@ def test_weights_that_are_more_than_weights_are_refused_even_with_trust(tmp_path
 def test_other_spaces_are_said_in_words(tmp_path):
     path = str(saved(tmp_path))
     with pytest.raises(
-        CheckpointError, match="for observations of 161 numbers, this environment h"
+        CheckpointError, match="for observations of 161 numbers, but this environment h"
     ):
         make_agent(path, here(control="tool"))
     with pytest.raises(CheckpointError, match="this environment has 'achieved_goal': 3 numbers"):
         make_agent(path, here(GOAL))
     SAC("MultiInputPolicy", env(GOAL), buffer_size=9, policy_kwargs={**TINY}).save(path)
     with pytest.raises(
-        CheckpointError, match="'observation': 154 numbers, this environment has 161"
+        CheckpointError, match="'observation': 154 numbers, but this environment has 161"
     ):
         make_agent(path, here())
 
@@ -224,8 +224,8 @@ def nameless(data):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (narrow, r"other bounds of actions: its action space has low \[-2"),
-        (wide, "for actions of 7 numbers, this environment has 6 numbers"),
+        (narrow, r"different action bounds: its action space has low \[-2"),
+        (wide, "for actions of 7 numbers, but this environment has 6 numbers"),
         (unsaid, "does not describe the observations"),
         (nameless, "does not describe its policy"),
     ],
@@ -247,7 +247,9 @@ def test_a_policy_of_dqn_is_told_apart(tmp_path):
         seen = json.loads(zipfile.ZipFile(saved(tmp_path)).read("data"))
         data["observation_space"] = seen["observation_space"]
 
-    with pytest.raises(CheckpointError, match="for actions of Discrete, this environment has 6"):
+    with pytest.raises(
+        CheckpointError, match="for actions of Discrete, but this environment has 6"
+    ):
         make_agent(str(rewritten(Path(path), change)), here())
 
 
@@ -255,7 +257,7 @@ def test_weights_of_another_network_are_refused(tmp_path):
     other = io.BytesIO()
     torch.save({"action_net.weight": torch.zeros(6, 3)}, other)
     path = rewritten(saved(tmp_path), lambda data: None, **{"policy.pth": other.getvalue()})
-    with pytest.raises(CheckpointError, match="not those of the policy that it describes"):
+    with pytest.raises(CheckpointError, match="do not match the policy that it describes"):
         make_agent(str(path), here())
 
 
@@ -269,7 +271,7 @@ def test_statistics_beside_a_policy_want_trust(name, tmp_path):
     wrapper.obs_rms.mean[:] = 0.25
     wrapper.save(str(tmp_path / name))
     with pytest.raises(
-        CheckpointError, match=rf"{name}.*pickle, which can run arbitrary code.*--trust.*move"
+        CheckpointError, match=rf"{name}.*pickle, which can execute arbitrary code.*--trust.*move"
     ):
         make_agent(str(path), here())
     agent, seen = make_agent(str(path), here(), trust=True), env().observation_space.sample()
@@ -296,5 +298,5 @@ def test_statistics_of_rewards_alone_change_nothing(tmp_path):
 def test_a_pickle_of_something_else_is_no_statistics(tmp_path):
     path = saved(tmp_path)
     (tmp_path / "vecnormalize.pkl").write_bytes(pickle.dumps([1, 2]))
-    with pytest.raises(CheckpointError, match="must hold the statistics of a VecNormalize"):
+    with pytest.raises(CheckpointError, match="must contain the statistics of a VecNormalize"):
         make_agent(str(path), here(), trust=True)

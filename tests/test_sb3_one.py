@@ -126,7 +126,7 @@ def test_methods_for_all_environments_together_are_not_for_some():
     env = HRCVecEnv(2, perception="none")
     env.env_method("set_reward", RewardConfig(effort=-5.0))
     assert env.simulation.reward_weights.effort == -5.0
-    with pytest.raises(ConfigError, match="for all environments together"):
+    with pytest.raises(ConfigError, match="to all environments together"):
         env.env_method("close", indices=[0])
     env.env_method("close")
     assert env.get_attr("closed") == [True, True]
@@ -138,13 +138,13 @@ def test_methods_for_all_environments_together_are_not_for_some():
         (lambda env: env.set_options({"steps": 1}), r"Did you mean 'steps_left'\?"),
         (lambda env: env.set_options({"steps_left": 0}), "from 1 to"),
         (lambda env: env.set_options({"reset_mask": np.ones(2, bool)}), "of one environment"),
-        (lambda env: env.set_options([{}]), "a mapping for each environment"),
-        (lambda env: env.set_attr("render_mode", "rgb_array"), "when they are made"),
-        (lambda env: env.set_attr("people", "hurried"), "when they are made"),
+        (lambda env: env.set_options([{}]), "one mapping per environment"),
+        (lambda env: env.set_attr("render_mode", "rgb_array"), "settings are fixed at creation"),
+        (lambda env: env.set_attr("people", "hurried"), "settings are fixed at creation"),
         (lambda env: env.set_attr("np_random", 3), "must be a numpy.random.Generator"),
         (lambda env: env.env_method("step", np.zeros(6)), "steps with the others"),
         (lambda env: env.env_method("mosiac"), "Did you mean 'mosaic'"),
-        (lambda env: env.get_attr("simulation"), "Unknown attribute of one environment"),
+        (lambda env: env.get_attr("simulation"), "Unknown attribute of a single environment"),
         (lambda env: env.get_attr("spec", [2]), "indices must be a whole number from -2 to 1"),
         (lambda env: env.env_method("reset", options={"elapsed": 1}), "'elapsed_steps'"),
     ],

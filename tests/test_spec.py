@@ -56,7 +56,7 @@ PLACES = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)]
         {"config": {"scene": {"cameras": [{"name": "a", "eye_world": PLACES[0]}]}}},
     ],
 )
-@pytest.mark.filterwarnings("ignore:There is one camera:UserWarning")
+@pytest.mark.filterwarnings("ignore:The rig has a single camera:UserWarning")
 def test_every_argument_survives_the_spec(kwargs):
     """As JSON, in both of gymnasium's doors; what it comes to is the same."""
     env = gymnasium.make("HRCReach-v0", perception="keypoints", **kwargs)

@@ -184,7 +184,9 @@ def test_ctrl_c_saves_and_says_how_to_go_on(tmp_path, monkeypatch, capsys):
         assert main(["train", *TINY, "--timesteps", "768", "--out", str(folder)]) == 130
     assert signal.getsignal(signal.SIGINT) is before
     said = capsys.readouterr().out.splitlines()[-1]
-    assert said.startswith("Stopped at 260 steps, which are saved. To continue: python -m hrc_env")
+    assert said.startswith(
+        "Stopped at 260 steps; the state is saved. To continue: python -m hrc_env"
+    )
     words = shlex.split(said.split("python -m hrc_env ")[1])
     assert words == ["train", "--resume", str(folder), "--timesteps", "768"]
     assert checkpoints.describe(folder / "policy.zip")["num_timesteps"] == 260
@@ -217,7 +219,7 @@ def test_a_run_of_an_older_version_resumes_with_defaults_for_what_it_lacks(run, 
 
 def test_a_run_that_has_learnt_enough_says_so(run, capsys):
     assert main(["train", *TINY, "--resume", str(run), "--timesteps", "256"]) == 2
-    assert "set --timesteps to more than that" in " ".join(capsys.readouterr().err.split())
+    assert "set --timesteps to a larger number" in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_learning_curve_is_drawn_over_environment_steps(run, tmp_path, monkeypatch):

@@ -155,7 +155,7 @@ class RLlibPPO:
         except Exception as error:  # raised by RLlib if no runner knows the spaces
             _LOGGER.handlers = self._handlers
             if reason := self._reason():
-                raise HRCError(f"No worker could make its environments: {reason}") from error
+                raise HRCError(f"No worker could create its environments: {reason}") from error
             raise
 
     def push(self) -> None:
@@ -230,7 +230,7 @@ class RLlibPPO:
         """Return the last error that a worker raised, or else RLlib's report of its failure."""
         if reason := self._reason():
             return reason
-        return f"a process that was killed, or ran out of memory ({self._log.message})"
+        return f"a process was killed or ran out of memory ({self._log.message})"
 
     def _reason(self) -> str:
         """Return the message of the last error that a worker raised, or "" if there is none."""

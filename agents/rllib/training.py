@@ -85,12 +85,12 @@ def _updates(
             rllib.pull()
             log.save()
             raise HRCError(
-                f"No worker has stepped in {without} updates: they die again and again. The last "
-                f"error: {rllib.last_error()}. What was learnt is in {log.folder}/."
+                f"No worker completed a step in {without} updates: they die repeatedly. The last "
+                f"error: {rllib.last_error()}. The current policy is saved in {log.folder}/."
             )
         if sampled.n_restarts > n_restarts:
             n_restarts = sampled.n_restarts
-            log.meter.say(f"A worker died and was started anew ({n_restarts} so far).")
+            log.meter.say(f"A worker died and was restarted ({n_restarts} so far).")
         learner.num_timesteps += sampled.n_steps
         log.recent.extend(sampled.episodes)
         for name, value in sampled.facts().items():

@@ -15,14 +15,18 @@ class Watch:
     def __init__(self, task: str) -> None:
         tags = {"tag_keys": ("task",)}
         self._rates = {
-            "steps_per_s": Gauge("hrc_env_steps_per_s", "Environment steps a second.", **tags),
-            "workers": Gauge("hrc_env_workers", "Workers that step environments.", **tags),
+            "steps_per_s": Gauge("hrc_env_steps_per_s", "Environment steps per second.", **tags),
+            "workers": Gauge(
+                "hrc_env_workers", "Number of workers that step environments.", **tags
+            ),
         }
         self._sums = {
-            "steps": Counter("hrc_env_steps", "Environment steps.", **tags),
-            "episodes": Counter("hrc_env_episodes", "Episodes that ended.", **tags),
-            "contacts": Counter("hrc_env_contacts", "Contacts with the true worker.", **tags),
-            "goals": Counter("hrc_env_goals", "Goals reached.", **tags),
+            "steps": Counter("hrc_env_steps", "Number of environment steps.", **tags),
+            "episodes": Counter("hrc_env_episodes", "Number of completed episodes.", **tags),
+            "contacts": Counter(
+                "hrc_env_contacts", "Number of contacts with the true worker.", **tags
+            ),
+            "goals": Counter("hrc_env_goals", "Number of goals reached.", **tags),
         }
         for each in (*self._rates.values(), *self._sums.values()):
             each.set_default_tags({"task": task})

@@ -70,7 +70,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
     for k, name in enumerate(config.scenes):
         body = worker_names()[k % len(worker_names())]
         for i, (view, picture) in enumerate(views(name, body).items()):
-            seen = "for people" if i == 0 else "what this camera of the rig sees"
+            seen = "for people" if i == 0 else "view of this camera of the rig"
             hang(picture, "Places", f"{name}, {view.replace('_', ' ')}", seen, i == 0)
     for name in config.bodies:
         caption = f"{load_body(name).stature_m:.2f} m tall"

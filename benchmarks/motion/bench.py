@@ -38,7 +38,7 @@ class MotionBench:
         """Raise `ConfigError` if a number is invalid."""
         check_at_least_one(self, "n_seeds")
         if not self.bodies:
-            raise ConfigError(f"bodies must name some of {worker_names()}.")
+            raise ConfigError(f"bodies must be some of {worker_names()}.")
 
     @property
     def seeds(self) -> list[int]:

@@ -30,10 +30,10 @@ def report(metrics: Metrics) -> Report:
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in list_targets(ANY))
     return Report("Motion bench", lead, (
         "## Comparison with measurements of people", _targets(scenes, metrics),
-        "## Every scene",
+        "## All scenes",
         format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
-        f"Everywhere: {'; '.join(asked)}.",
-    ), "the smallest and the largest body's")  # fmt: skip
+        f"In all scenes: {'; '.join(asked)}.",
+    ), "the smallest and the largest value over bodies")  # fmt: skip
 
 
 def inside(target: Target, metric: Metric) -> bool:

@@ -93,7 +93,7 @@ class PerceptionBench:
                 f"number nor fault_steps n_steps, got {self.n_faults} and {self.fault_steps}."
             )
         if not self.bodies:
-            raise ConfigError(f"bodies must name some of {worker_names()}.")
+            raise ConfigError(f"bodies must be some of {worker_names()}.")
 
     @property
     def seeds(self) -> list[int]:

@@ -72,7 +72,9 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         if name != "lost"
     ]
     stages = [Column(f"stage_ms.{each}.{{}}", f"{each} [ms]") for each in (*STAGES, REST)]
-    less = Column("emulator_coverage_difference.{}", "coverage less pixels'", 3, signed=True)
+    less = Column(
+        "emulator_coverage_difference.{}", "coverage minus that of pixels", 3, signed=True
+    )
     parts = (
         "## Speed", SPEED.to_markdown(metrics),
         format_metrics("cameras.workers", paces, [Column("steps_per_s.{}", "steps [1/s]"), *stages],
@@ -86,7 +88,7 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
         "## Single crops", format_metrics("", views, [
             DETECTED, ERROR_SHARE, Column("error_share.{}.p95", "95 % [% of stature]", 1, 100),
         ], metrics), _ABOUT_CROPS,
-        "## The emulator beside the pixels",
+        "## Comparison of emulator and pixels",
         replace(EMULATOR, columns=(*EMULATOR.columns, less)).to_markdown(metrics),
         LASTING.to_markdown(metrics), _ABOUT_THE_EMULATOR,
     )  # fmt: skip

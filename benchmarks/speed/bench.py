@@ -92,7 +92,7 @@ class SpeedBench:
             find_task(self.task)
         check_at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
         if WATCHED not in self.levels:
-            raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
+            raise ConfigError(f"levels must contain {WATCHED!r}, got {self.levels}.")
 
     @property
     def quick_note(self) -> str:

@@ -85,7 +85,7 @@ class Organs:
         """Raise `HRCError` if a function in `ORGANS` has not been called in any run."""
         if self._idle:
             raise HRCError(
-                "The speed bench's table of organs names functions that no step calls, so that "
-                f"their work would be missed: {', '.join(sorted(self._idle))}. Correct ORGANS in "
+                "The table ORGANS contains functions that no step calls, so that their time would "
+                f"not be measured: {', '.join(sorted(self._idle))}. Correct ORGANS in "
                 "benchmarks/speed/organs.py."
             )

@@ -40,7 +40,7 @@ def report(metrics: Metrics, figures: Path) -> Report:
     """
     tasks = TASKS.to_markdown(metrics)
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
-        return Report("Speed of every id", ASKED, [tasks], SPREAD)
+        return Report("Speed of every task", ASKED, [tasks], SPREAD)
     plot_organs(figures / "organs.png", metrics)
     pairs = [name.split(".", 1) for name in list_endings(metrics, "env_steps_per_s.")]
     levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)

@@ -14,15 +14,15 @@ _LEAD = f"""\
 Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are
 simulated walkers with independent detection errors of 3 px; `{ENV}` is the environment's worker
 through the emulator. `hard` has occlusion, gross errors and exchanged sides. In `drifting`,
-detection errors last half a second, and estimators do not know it. In `late`, images arrive 40 to
+detection errors last half a second, which estimators do not model. In `late`, images arrive 40 to
 220 ms late, one camera has half the frame rate, and one image in twenty is lost. `one_camera_...`
 are the first half second, second and two seconds of the four in which one camera remains;
 `after_return` begins a second after the other cameras have returned. `{DLT}` is linear
 triangulation of each frame; `{SMOOTHER}` knows the whole clip and is not compared."""
 _ABOUT_THE_BOUND = """\
-`matched` bodies move as the estimators' motion model says, without bones; estimators are told so
-(no outliers, no exchanged sides, detections as good as they say, nothing known of bone lengths),
-and still learn the joints' places on the body. The bound is that of each sequence, averaged."""
+`matched` bodies move as in the estimators' motion model, without bones. Estimators are configured
+accordingly (no outliers, no exchanged sides, correct noise of detections, unknown bone lengths),
+but still learn the joints' positions on the body. The bound is the mean over the sequences."""
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:

@@ -28,7 +28,7 @@ class Tend(Task):
     observations = (
         ObservationTerm(
             name="station", size=3, unit="m", frame="world", bound=3.0, scale=0.5,
-            doc="From the tool to the next station.",
+            doc="Position of the next station, relative to the tool.",
             function=lambda belief: belief.task - belief.robot.tool_world,
         ),
     )  # fmt: skip

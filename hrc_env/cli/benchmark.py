@@ -14,7 +14,7 @@ from hrc_env.tasks import BUILT_IN
 
 @dataclass(frozen=True, kw_only=True)
 class Benchmark(EngineArguments):
-    """Score a policy on fixed seeds in the setups of the benchmark.
+    """Evaluate a policy on fixed seeds in the setups of the benchmark.
 
     The setups differ in the workers (unaware, hurried or attentive), the perception (four cameras,
     delayed frames, one camera or the true poses) and the shield (without or with one). The report

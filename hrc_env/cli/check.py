@@ -65,7 +65,7 @@ class Check:
 
 def _check_python() -> Finding:
     is_ok = sys.version_info >= (3, 11)
-    return Finding(is_ok, f"{sys.version.split()[0]} (3.11 or newer is needed)")
+    return Finding(is_ok, f"{sys.version.split()[0]} (3.11 or newer is required)")
 
 
 def _check_packages() -> Finding:
@@ -92,9 +92,9 @@ def _check_machine() -> Finding:
     from hrc_env.core.machine import usable_cores, usable_memory_gb
 
     cores, memory_gb = usable_cores(), usable_memory_gb()
-    text = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: pixels will be slow"
+    text = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: perception pixels will be slow"
     text += f", {memory_gb:.1f} GB of memory"
-    too_little = ": too little for pixels and films" if memory_gb < LITTLE_GB else ""
+    too_little = ": too little for perception pixels and videos" if memory_gb < LITTLE_GB else ""
     return Finding(True, text + too_little)
 
 
@@ -104,13 +104,13 @@ def _check_opengl() -> Finding:
 
 def _check_triton() -> Finding:
     if importlib.util.find_spec("triton") is None:
-        return Finding(True, "not installed (torch's CPU build has none): no clash with Mesa")
+        return Finding(True, "not installed (torch's CPU build has none): no conflict with Mesa")
     ours = version("triton")
     if not _run_in_process(DRAW).is_ok:
-        return Finding(True, f"{ours}; OpenGL does not draw, so they cannot clash")
+        return Finding(True, f"{ours}; OpenGL does not work, so that they cannot conflict")
     finding = _run_in_process(f"{DRAW}; import triton")
-    after = "can be imported after OpenGL has drawn"
-    text = after if finding.is_ok else f"after OpenGL has drawn: {finding.message}"
+    after = "can be imported after OpenGL was used"
+    text = after if finding.is_ok else f"after OpenGL was used: {finding.message}"
     return Finding(finding.is_ok, f"{ours} {text}")
 
 
@@ -134,7 +134,7 @@ def _check_kernels() -> Finding:
     if not todo:
         return Finding(True, f"compiled, in {folder()}")
     wait_s = sum(signature.seconds for signature in todo) / n_cores()
-    text = f"{len(todo)} are not compiled yet, which takes about {wait_s:.0f} s for all when they"
+    text = f"{len(todo)} are not compiled yet, which takes about {wait_s:.0f} s in total when they"
     return Finding(True, f"{text} are first used; to compile them now: python -m hrc_env setup")
 
 
@@ -143,15 +143,15 @@ def _check_weights() -> Finding:
 
     for name in weights.ALWAYS:
         weights.find_weights(name)
-    return Finding(True, f"official, in {weights.cache_dir()}")
+    return Finding(True, f"official weights, in {weights.cache_dir()}")
 
 
 def _check_openvino() -> Finding:
     from hrc_env.perception import vino
 
     if not vino.is_installed():
-        return Finding(True, f"not installed; it makes pixels faster: {vino.INSTALL}")
-    text = f"computes in {vino.precision()} where detector.runtime is openvino or auto"
+        return Finding(True, f"not installed; it speeds up perception pixels: {vino.INSTALL}")
+    text = f"computes in {vino.precision()} if detector.runtime is openvino or auto"
     return Finding(True, text)
 
 

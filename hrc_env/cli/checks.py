@@ -15,7 +15,7 @@ def check_at_least(option: str, value: float | None, low: float) -> None:
 
 def check_writable_folder(path: Path, option: str = "--out") -> None:
     """Raise `HRCError` if files cannot be written into a folder, which need not exist yet."""
-    reason = "a file of that name is there, and a folder is needed" if path.is_file() else ""
+    reason = "a file has this name, but a folder is required" if path.is_file() else ""
     _raise_if(reason or _explain_unwritable(path), option, path)
 
 
@@ -28,7 +28,7 @@ def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> 
     """
     if suffix and path.suffix.lower() != suffix:
         raise ConfigError(f"{option} must end in {suffix}, got {path.name!r}.")
-    reason = "it is a folder, and a file is needed" if path.is_dir() else ""
+    reason = "it is a folder, but a file is required" if path.is_dir() else ""
     _raise_if(reason or _explain_unwritable(path.parent), option, path)
 
 
@@ -41,10 +41,10 @@ def _explain_unwritable(folder: Path) -> str:
         with tempfile.TemporaryFile(dir=there) as file:
             file.write(b"hrc_env")
     except OSError as error:
-        return f"{there}: {error.strerror}" if there.is_dir() else f"{there} is no folder"
+        return f"{there}: {error.strerror}" if there.is_dir() else f"{there} is not a folder"
     return ""
 
 
 def _raise_if(reason: str, option: str, path: Path) -> None:
     if reason:
-        raise HRCError(f"{path} cannot be written ({reason}). Name another place with {option}.")
+        raise HRCError(f"{path} cannot be written ({reason}). Choose another path with {option}.")

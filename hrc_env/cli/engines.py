@@ -31,7 +31,8 @@ class EngineArguments:
         """
         if self.stays and self.engine not in (None, "serial"):
             raise ConfigError(
-                f"--engine {self.engine} does not work here: {self.stays}. Leave it out."
+                f"--engine {self.engine} is not available here: {self.stays}. Leave out this "
+                "option."
             )
         return engine_called(self.engine, self.workers, self.address)
 

@@ -40,13 +40,13 @@ def import_first(words: Sequence[str], program: str) -> list[str]:
     while "--import" in words:
         at = words.index("--import")
         if at + 1 == len(words):
-            raise ConfigError("--import takes a Python file, as in --import my_task.py.")
+            raise ConfigError("--import takes a Python file, for example --import my_task.py.")
         known, file = os.environ.get(IMPORT, ""), str(Path(words[at + 1]).resolve())
         os.environ[IMPORT] = os.pathsep.join(filter(None, (known, file)))
         words = words[:at] + words[at + 2 :]
     import_files()
     if not words:
-        raise ConfigError(f"--import needs a command; {program} --help lists them.")
+        raise ConfigError(f"--import requires a command; {program} --help lists them.")
     return words
 
 

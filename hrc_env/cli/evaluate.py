@@ -20,7 +20,7 @@ from hrc_env.tasks import DEFAULT
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(EnvironmentArguments, EngineArguments):
-    """Score an agent over whole episodes with fixed seeds: goals, contacts and cost.
+    """Evaluate an agent over whole episodes with fixed seeds: goals, contacts and cost.
 
     Episodes are played on one machine or on a cluster. The seed of the first episode is --seed, and
     it increases by one with each further episode. The k-th episode is the same for every agent and

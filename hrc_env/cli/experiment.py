@@ -141,7 +141,7 @@ class AblationsExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class Experiment:
-    """Run an experiment of the paper or of this package.
+    """Run an experiment of the paper or an additional one.
 
     The paper's two experiments are site and lab; impact measures the effect of perception on
     safety, price the cost of perception at an equal rate of contacts, and ablations compares rigs

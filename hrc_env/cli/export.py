@@ -23,7 +23,8 @@ class Export(ExportRequest):
         check_at_least("--episodes", self.episodes, 1)
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.name):
             raise ConfigError(
-                f"--name takes small letters, digits and _, as fast_shielded; got {self.name!r}."
+                "--name must consist of lowercase letters, digits and _, such as fast_shielded; "
+                f"got {self.name!r}."
             )
         check_writable_folder(self.out)
         from hrc_env.agents import export  # here: it imports the learner

@@ -76,7 +76,9 @@ class ImportMotion:
         """Read and fit the recording, print the errors and write the clip; return the status."""
         check_writable_file(self.out, ".npz")
         if self.out.resolve() == self.file.resolve():
-            raise ConfigError("--out is the recording itself; give the clip another name.")
+            raise ConfigError(
+                "--out is the path of the recording itself; choose another path for the clip."
+            )
         if self.picture is not None:
             check_writable_file(self.picture, ".png", "--picture")
         from hrc_env.mocap.retarget import retarget
@@ -119,7 +121,7 @@ class ImportMotion:
 def print_capture(console: Console, capture: "Capture") -> None:
     """Print the length and frame rate of a recording, and the repairs that were made."""
     n_frames = len(capture.joints_world)
-    text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
+    text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} Hz, "
     console.print(text + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
     for sentence in capture.notes:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
@@ -138,9 +140,9 @@ def print_error(console: Console, capture: "Capture", clip: "Clip", error: "Reta
     slide = f"standing feet slide by {100 * error.slip_m_s:.1f} cm/s (p95)."
     console.print(
         table,
-        f"Errors after one alignment of the whole clip (scale {error.scale:.2f}).",
-        f"The left foot stands for {left:.0f} % of the time, the right for {right:.0f} %; "
-        + ("no flat foot stands still." if math.isnan(error.slip_m_s) else slide),
+        f"Errors after a single alignment of the whole clip (scale {error.scale:.2f}).",
+        f"The left foot stands {left:.0f} % of the time, the right one {right:.0f} %; "
+        + ("no foot stands flat and still." if math.isnan(error.slip_m_s) else slide),
         sep="\n", highlight=False,
     )  # fmt: skip
 

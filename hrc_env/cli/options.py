@@ -60,8 +60,8 @@ def normalize_words(command: type[Any], words: Sequence[str], program: str) -> l
             continue  # the default
         if equals and (text.lower() not in BOOLEANS or is_off):
             raise ConfigError(
-                f"--{name} takes True, False or no value: --{name}, --no-{name}; got {word!r}"
-                f"{f' {text!r}' if equals == ' ' else ''}."
+                f"--{name} takes True, False or no value (--{name}, --no-{name}); got "
+                f"{word!r}{f' {text!r}' if equals == ' ' else ''}."
             )
         is_on = BOOLEANS.get(text.lower(), True) and not is_off
         if name in optional:
@@ -76,7 +76,7 @@ def _make_unknown_error(option: str, options: dict[str, Any], program: str) -> C
     names += [f"--no-{name}" for name, kind in options.items() if kind is bool]
     near = difflib.get_close_matches(option.replace("_", "-"), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    return ConfigError(f"Unknown option {option!r}.{hint} {program} --help lists all.")
+    return ConfigError(f"Unknown option {option!r}.{hint} {program} --help lists all options.")
 
 
 def _find_options(command: type[Any]) -> dict[str, Any]:

@@ -114,7 +114,7 @@ class Demo(EnvironmentArguments):
         ctrl_dt = resolve_settings(**self.keywords()).config.ctrl_dt
         check_at_least("--seconds", self.seconds, ctrl_dt)
         make_ready(Console(), self.perception, draws=True, installs=True)
-        title = "the worker is known through four cameras only"
+        title = "the robot perceives the worker only through four cameras"
         film_agent(self, "scripted_slowed", self.out, round(self.seconds / ctrl_dt), title)
         Console().print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")
         return 0

@@ -38,19 +38,19 @@ class Record(RecordingRequest):
         check_at_least("--seed", self.seed, 0)
         if self.perception == "pixels":
             raise ConfigError(
-                "--perception pixels is too slow to record: record keypoints, which emulates it; "
-                "--observe-images 84 84 records the camera images."
+                "--perception pixels is too slow for recording: use --perception keypoints, which "
+                "emulates it; --observe-images 84 84 records the camera images."
             )
         if (self.out is None) == (self.folder is None):
             raise ConfigError(
-                "A data set needs one place: --out NAME-v0, which Minari loads, or --folder "
-                "FOLDER, which hrc_env.load_episodes reads."
+                "A data set needs exactly one destination: --out NAME-v0, for Minari, or --folder "
+                "FOLDER, for hrc_env.load_episodes."
             )
         if self.folder is not None:
             check_writable_folder(self.folder.absolute().parent, "--folder")
         if self.keypoints and self.perception != "keypoints":
             raise ConfigError(
-                f"--keypoints need cameras, and --perception {self.perception} has none."
+                f"--keypoints requires cameras, but --perception {self.perception} has none."
             )
         from hrc_env.agents import recording  # here: --help imports no simulator
         from hrc_env.agents.registry import check_agent

@@ -10,7 +10,7 @@ from hrc_env.pipeline.ready import compile_kernels, fetch_networks, find_opengl
 
 @dataclass(frozen=True)
 class Setup:
-    """Fetch the weights of the pose network, compile the kernels and check headless OpenGL.
+    """Download the weights of the pose network, compile the kernels and check headless OpenGL.
 
     Weights are fetched once and verified; kernels are compiled for this machine.
     """

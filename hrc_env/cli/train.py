@@ -13,7 +13,7 @@ ENGINES = ("sb3", "ray")
 
 @dataclass(frozen=True, kw_only=True)
 class Train(TrainingRequest):
-    """Train a policy, evaluate it on fixed seeds, plot its learning curve and film it.
+    """Train a policy, evaluate it on fixed seeds, plot its learning curve and record a video.
 
     Ctrl-C saves the policy and prints the command that continues the training. Existing files are
     never overwritten: a second run with --out runs/quick writes to runs/quick-2. To see learning
@@ -38,8 +38,8 @@ class Train(TrainingRequest):
         _check_limit(self.cost_limit, mine.algorithm)
         if self.her and mine.algorithm != "sac":
             raise ConfigError(
-                f"--her relabels the goals in a replay buffer, and {mine.algorithm} has "
-                "no such buffer: --algorithm sac --her True, or leave it out."
+                f"--her relabels the goals in a replay buffer, but {mine.algorithm} has no replay "
+                "buffer: use --algorithm sac --her True, or leave out --her."
             )
         self._check_engine(mine.algorithm)
         from hrc_env.agents import training  # here: it imports the learner
@@ -55,19 +55,20 @@ class Train(TrainingRequest):
         if self.engine == "ray":
             if algorithm != "ppo":
                 raise ConfigError(
-                    f"--engine ray trains with ppo only, and {algorithm} needs "
-                    "Stable-Baselines3: --algorithm ppo, or --engine sb3."
+                    f"--engine ray supports only ppo, and {algorithm} requires Stable-Baselines3: "
+                    "use --algorithm ppo or --engine sb3."
                 )
             if self.workers is not None:
                 check_at_least("--workers", self.workers, 1)
             return
         for name in ("workers", "address"):
             if getattr(self, name) is not None:
-                raise ConfigError(f"--{name} needs --engine ray.")
+                raise ConfigError(f"--{name} requires --engine ray.")
         if self.perception == "pixels":
             raise ConfigError(
-                "--perception pixels is too slow to train with on one machine: train on keypoints, "
-                "which emulates it, and play the policy on pixels; or --engine ray."
+                "--perception pixels is too slow for training on one machine: train with "
+                "--perception keypoints, which emulates it, and play the policy with pixels; or "
+                "use --engine ray."
             )
 
 
@@ -75,13 +76,15 @@ def _check_limit(limit: float | None, algorithm: str) -> None:
     has_limit = algorithm == "ppo_lagrangian"
     if limit is not None and not (math.isfinite(limit) and limit > 0):
         raise ConfigError(
-            f"--cost-limit must be above 0, got {limit:g}. Without a limit an episode costs about "
-            "70; 30 can be reached. A shield brings the cost further down."
+            f"--cost-limit must be above 0, got {limit:g}. Without a limit, an episode costs about "
+            "70; a limit of 30 can be reached. A shield reduces the cost further."
         )
     if limit is not None and not has_limit:
         raise ConfigError(
-            f"--cost-limit needs ppo_lagrangian, and {algorithm} ignores cost: "
-            "--algorithm ppo_lagrangian, or leave the limit out."
+            f"--cost-limit requires ppo_lagrangian, and {algorithm} ignores cost: use --algorithm "
+            "ppo_lagrangian, or leave out the limit."
         )
     if has_limit and limit is None:
-        raise ConfigError("--algorithm ppo_lagrangian needs a limit, as --cost-limit 30.")
+        raise ConfigError(
+            "--algorithm ppo_lagrangian requires a limit, for example --cost-limit 30."
+        )

@@ -51,7 +51,8 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
         signature.bind(*names)
     except TypeError as error:
         raise ConfigError(
-            f"{what} must be a function of ({', '.join(names)}), got one of {signature}: {error}."
+            f"{what} must be a function of ({', '.join(names)}), got a function of {signature}: "
+            f"{error}."
         ) from error
 
 
@@ -76,7 +77,7 @@ def function_called(what: str, name: str, meaning: str) -> Any:
     except (ImportError, AttributeError, ValueError) as error:
         raise ConfigError(
             f"There is no {what} {name!r} ({error}). It must be MODULE:FUNCTION: a module that can "
-            f"be imported from here, and in it {meaning}."
+            f"be imported from the working directory, which contains {meaning}."
         ) from error
     return found
 
@@ -110,7 +111,8 @@ def numbers_of(
     if finite and not np.isfinite(numbers).all():
         n = int(np.size(numbers) - np.isfinite(numbers).sum())
         raise ConfigError(
-            f"{what} must be finite ({meaning}), got {n} of {numbers.size} numbers that are not."
+            f"{what} must be finite ({meaning}), got {n} of {numbers.size} numbers that are not "
+            "finite."
         )
     return numbers
 
@@ -129,7 +131,7 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
     """
     numbers = numbers_of(what, value, shape, meaning)
     if not np.isin(numbers, (0.0, 1.0)).all():
-        raise ConfigError(f"{what} must be true or false, got other numbers.")
+        raise ConfigError(f"{what} must be true or false (1 or 0), got other numbers.")
     return numbers > 0
 
 

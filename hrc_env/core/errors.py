@@ -68,15 +68,17 @@ def learner() -> Generator[None]:
         yield
     except ModuleNotFoundError as error:
         raise MissingExtraError(
-            f"Learning and trained policies need {error.name}, which is not installed. Type: "
-            'pip install "hrc_env[train]"  (in a checkout: make train-quick, or '
-            'pip install -c constraints.txt -e ".[train]")'
+            f"Learning and trained policies need {error.name}, which is not installed. Install it "
+            'with: pip install "hrc_env[train]"  (in a checkout: make train-quick, or pip install '
+            '-c constraints.txt -e ".[train]")'
         ) from error
 
 
 REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
 """Kinds of objects that users can register (`hrc_env.registration`)."""
-OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
+OWN = (
+    "A custom one becomes available when its file is imported: --import FILE, hrc_env.import_files."
+)
 
 
 def make_unknown_name_error(what: str, got: object, valid: Iterable[str]) -> ConfigError:
@@ -128,7 +130,7 @@ def check_fields(record: object, must: str, *names: str) -> None:
 def require(value: T | None, what: str) -> T:
     """Return a value, or raise `ConfigError` if it is None."""
     if value is None:
-        raise ConfigError(f"{what} is asked for, and there is none here.")
+        raise ConfigError(f"{what} is required, but is not available in this environment.")
     return value
 
 

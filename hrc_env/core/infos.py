@@ -107,45 +107,56 @@ class Entry(NamedTuple):
     substitute shows it."""
 
 
-CAME = "0 where no contact begins"
+CAME = "0 if no contact begins"
 SHIELDED = "with `shield=`: "
 ENTRIES: dict[str, Entry] = {
     "shield/change": Entry(
         "rad/s", f"{SHIELDED}length of the change of the joint velocities by the shield"
     ),
     "shield/active": Entry("0 or 1", f"{SHIELDED}whether that change exceeds 0.02 rad/s"),
-    "shield/scale": Entry("-", f"{SHIELDED}share of the command that is left along itself; 1: all"),
+    "shield/scale": Entry(
+        "-",
+        f"{SHIELDED}component of the allowed velocities along the command, as a share of the "
+        "command's length; 1 if unchanged",
+    ),
     "shield/clearance_m": Entry(
         "m",
-        "built-in shields: least clearance D between robot and estimated bodies, after margins, "
-        "Z_d and the worker's travel; infinite if no body is near enough to matter",
+        "built-in shields: smallest clearance D between the robot and estimated bodies, minus "
+        "margins, Z_d and the worker's travel; infinite if no body is close enough for a "
+        "constraint",
         np.inf,
     ),
     "shield/slack": Entry(
         "m/s",
-        "built-in shields: greatest violation of a constraint, retreats that are not yet reached "
-        "included",
+        "built-in shields: largest violation of a constraint, including velocities of retreat that "
+        "are not reached yet",
     ),
     "shield/unknown": Entry(
         "0 or 1",
-        "built-in shields: a person may be near whom no camera detects, and the speed is limited",
+        "built-in shields: whether a person whom no camera detects may be near, so that the speed "
+        "is limited",
     ),
-    "cost_proximity": Entry("0 or 1", "the true surfaces came nearer than `cost.proximity_m`"),
+    "cost_proximity": Entry(
+        "0 or 1", "whether the true surfaces came closer than `cost.proximity_m`"
+    ),
     "cost_contact": Entry(
-        "0 or 1", "the true surfaces touched at any physics substep, by distance"
+        "0 or 1",
+        "whether the true surfaces touched in any physics substep, according to their distance",
     ),
     "cost": Entry(
         "control steps",
-        "sum of `cost.components`: by default 1 for a step nearer than `cost.proximity_m` and 1 "
-        "for a step with a touch; 0 after a reset. Other components are `towards`, contacts that "
-        "begin while the robot moves towards the worker; `force`, the `contact_force_ratio` of "
-        "contacts; `separation_violated`; `near_miss`. Each chosen one has its own key "
+        "sum of `cost.components`: by default 1 for a step closer than `cost.proximity_m` and 1 "
+        "for a step with a touch; 0 after a reset. Other components are `towards` (contacts that "
+        "begin while the robot moves towards the worker), `force` (the `contact_force_ratio` of "
+        "contacts), `separation_violated` and `near_miss`. Each selected component also has a key "
         "`cost_<name>`",
     ),
-    "cost_sum": Entry("control steps", "the same, under the name that some safe-RL libraries read"),
+    "cost_sum": Entry(
+        "control steps", "equal to `cost`, under the key that some safe-RL libraries expect"
+    ),
     "episode_cost": Entry("control steps", "sum of `cost` over the episode so far"),
     "safety/min_separation_m": Entry(
-        "m", "least true separation of the step; infinite without workers", np.inf
+        "m", "smallest true separation in the step; infinite without workers", np.inf
     ),
     "safety/robot_towards_m_s": Entry(
         "m/s",
@@ -162,103 +173,116 @@ ENTRIES: dict[str, Entry] = {
     ),
     "safety/separation_violated": Entry(
         "0 or 1",
-        "the robot moves towards a worker at more than 0.05 m/s within the protective distance of "
-        "ISO/TS 15066, with both true directed speeds, 0.1 s of reaction and `time_to_stop_s`",
+        "whether the robot moves towards a worker at more than 0.05 m/s within the protective "
+        "distance of ISO/TS 15066, computed from both true directed speeds, a reaction time of 0.1 "
+        "s and `time_to_stop_s`",
     ),
-    "safety/time_to_stop_s": Entry("s", "time in which all joints stop, at the greatest slew"),
+    "safety/time_to_stop_s": Entry("s", "time until all joints stop, at their maximum slew rate"),
     "safety/contact_robot_speed_m_s": Entry(
-        "m/s", f"contact that begins: the robot's directed speed in the step before; {CAME}", 0.0
+        "m/s",
+        "for a contact that begins: the robot's speed towards the worker in the previous "
+        f"step; {CAME}",
+        0.0,
     ),
     "safety/contact_closing_speed_m_s": Entry(
-        "m/s", f"contact that begins: that speed plus the worker's directed speed; {CAME}", 0.0
+        "m/s",
+        f"for a contact that begins: that speed plus the worker's speed towards the robot; {CAME}",
+        0.0,
     ),
     "safety/contact_force_ratio": Entry(
         "-",
-        "contact that begins: force of ISO/TS 15066, A.3, at the closing speed, with half of the "
-        "robot's moving mass and its load, divided by the transient limit of the region; for the "
-        f"head, which has none, by the quasi-static one; {CAME}",
+        "for a contact that begins: force by ISO/TS 15066, A.3, at the closing speed, with half of "
+        "the robot's moving mass and its load, divided by the transient limit of the body region; "
+        f"for the head, which has no such limit, divided by the quasi-static one; {CAME}",
         0.0,
     ),
     "safety/contact_severity": Entry(
         "0 to 3",
-        "0: no contact begins, 1: within the limit of the region, 2: beyond it, 3: on the head",
+        "severity of a contact that begins: 0 if none begins, 1 within the force limit of the body "
+        "region, 2 above it, 3 on the head",
     ),
     "safety/contacts_towards": Entry(
         "-",
         "contacts in the episode so far that began while the robot moved towards the worker at "
-        "more than 0.05 m/s; another touch within 0.5 s belongs to the same contact",
+        "more than 0.05 m/s; touches within 0.5 s count as one contact",
     ),
     "safety/contacts_fleeing": Entry(
-        "-", "contacts in the episode so far that began while the robot moved away"
+        "-", "contacts in the episode so far that began while the robot moved away from the worker"
     ),
     "safety/contacts_standing": Entry(
-        "-", "contacts in the episode so far that began while the robot did neither"
+        "-",
+        "contacts in the episode so far that began while the robot moved neither towards the "
+        "worker nor away",
     ),
     "safety/near_misses": Entry(
         "-",
         "number of times in the episode so far that the separation fell below 0.05 m and rose "
-        "above 0.10 m without a touch",
+        "above 0.10 m again without a touch",
     ),
     "tracking/mpjpe_m": Entry(
         "m",
-        "mean joint error of the estimate, each track compared with the worker that fits best; -1 "
-        "without a track",
+        "mean joint error of the estimate, where each track is compared with the best matching "
+        "worker; -1 without a track",
         -1.0,
         "tracking/mpjpe_measured",
     ),
     "tracking/mpjpe_by_identity_m": Entry(
         "m",
-        "mean joint error of workers from the tracks that they were matched with last, wherever "
-        "these are now; -1 without a match. A match lasts while it is within 0.5 m (CLEAR MOT)",
+        "mean joint error of each worker relative to the track with which they were last matched, "
+        "however far apart; -1 without a match. A match is kept while it is within 0.5 m (CLEAR "
+        "MOT)",
         -1.0,
         "tracking/mpjpe_by_identity_measured",
     ),
     "tracking/id_switches": Entry(
         "-",
-        "number of times in the episode so far that a worker was matched with another slot than "
-        "before; two workers that are exchanged count twice",
+        "number of times in the episode so far that a worker was matched with a different slot "
+        "than before; a swap of two workers counts twice",
     ),
     "tracking/idf1": Entry(
         "0 to 1",
-        "IDF1 of the episode so far: 2 m / n, m steps in which a worker and a track were within "
-        "0.5 m, each worker with one slot throughout, n steps of workers and of tracks; -1 while n "
-        "is 0",
+        "IDF1 of the episode so far, 2 m / n, where m is the number of steps in which a worker and "
+        "a track were within 0.5 m, with one slot assigned to each worker throughout, and n the "
+        "sum of the steps of workers and of tracks; -1 while n is 0",
         -1.0,
         "tracking/idf1_measured",
     ),
-    "tracking/lost": Entry("0 or 1", "a worker is present without a track"),
+    "tracking/lost": Entry("0 or 1", "whether a worker is present without a track"),
     "task/goals_reached": Entry("-", "goals reached in the episode so far"),
-    "task/goals_missed": Entry("-", "goals of the episode so far whose time ran out"),
-    "task/studs_placed": Entry("-", "pieces that rest in their places, released"),
-    "task/studs_remaining": Entry("-", "pieces that are not in their places"),
-    "task/dropped": Entry("0 or 1", "a piece lies below the table, or the tool was lost"),
+    "task/goals_missed": Entry("-", "goals in the episode so far whose time limit expired"),
+    "task/studs_placed": Entry("-", "pieces that rest at their target positions, released"),
+    "task/studs_remaining": Entry("-", "pieces that are not at their target positions"),
+    "task/dropped": Entry("0 or 1", "whether a piece lies below the table, or the tool was lost"),
     "task/screws_driven": Entry("-", "screws that hold the board"),
-    "task/screws_remaining": Entry("-", "screws that are not driven yet"),
+    "task/screws_remaining": Entry("-", "screws that have not been driven yet"),
     "task/max_offset_m": Entry(
         "m",
-        "greatest deviation of the board from its place while screws were driven; -1 before",
+        "largest deviation of the board from its target position while screws were driven; -1 "
+        "before",
         -1.0,
         "task/max_offset_measured",
     ),
     "task/max_rotation_rad": Entry(
         "rad",
-        "greatest rotation of the board from its place while screws were driven; -1 before",
+        "largest rotation of the board from its target pose while screws were driven; -1 before",
         -1.0,
         "task/max_offset_measured",
     ),
     "task/handed_over": Entry(
-        "0 or 1", "the worker has the tool, and the robot has released it and moved away"
+        "0 or 1", "whether the worker has the tool and the robot has released it and moved away"
     ),
-    "task/not_handed_over": Entry("0 or 1", "the opposite of `task/handed_over`"),
+    "task/not_handed_over": Entry("0 or 1", "the negation of `task/handed_over`"),
     "task/max_hand_force_n": Entry(
         "N", "largest force on the worker's hand in the episode so far; 0 before any", 0.0
     ),
-    "task/delivered": Entry("0 or 1", "the base is in its zone, without a collision on the way"),
-    "task/not_delivered": Entry("0 or 1", "the opposite of `task/delivered`"),
+    "task/delivered": Entry(
+        "0 or 1", "whether the base reached its zone without a collision on the way"
+    ),
+    "task/not_delivered": Entry("0 or 1", "the negation of `task/delivered`"),
     "task/obstacle_hits": Entry("-", "number of collisions of the base with fixed objects"),
     "task/people_hits": Entry("-", "number of collisions of the base with workers"),
-    "task/remaining_path_m": Entry("m", "length of the path to the zone"),
-    "is_success": Entry("0 or 1", "success of the task, as its page defines it"),
+    "task/remaining_path_m": Entry("m", "length of the remaining path to the zone"),
+    "is_success": Entry("0 or 1", "success, as defined on the page of the task"),
     MISCALIBRATED: Entry(
         "-",
         "number of cameras that contradict the others as if they had been moved, rotated or "
@@ -266,26 +290,35 @@ ENTRIES: dict[str, Entry] = {
     ),
     MORE_PEOPLE: Entry(
         "0 or 1",
-        "cameras detect more people than there are slots for workers, which makes all slots "
-        "unknown; at `pixels` and `keypoints`",
+        "whether cameras detect more people than there are slots for workers, which makes all "
+        "slots unknown; at `pixels` and `keypoints`",
     ),
-    N_CAMERAS: Entry("-", "drawn: number of cameras in this episode; at `pixels` and `keypoints`"),
-    MOVED: Entry("m", "drawn: greatest displacement of a camera; at `pixels` and `keypoints`"),
-    TURNED: Entry("rad", "drawn: greatest rotation of a camera; at `pixels` and `keypoints`"),
+    N_CAMERAS: Entry("-", "drawn per episode: number of cameras; at `pixels` and `keypoints`"),
+    MOVED: Entry(
+        "m", "drawn per episode: largest displacement of a camera; at `pixels` and `keypoints`"
+    ),
+    TURNED: Entry(
+        "rad", "drawn per episode: largest rotation of a camera; at `pixels` and `keypoints`"
+    ),
     DELAY: Entry(
         "s",
-        "drawn: greatest delay of images, in whole control steps; at `pixels` and `keypoints`",
+        "drawn per episode: largest delay of images, rounded to whole control steps; at `pixels` "
+        "and `keypoints`",
     ),
-    LIGHT: Entry("-", "drawn: strength of the light, 1 as built; at `pixels` and `keypoints`"),
+    LIGHT: Entry(
+        "-",
+        "drawn per episode: intensity of the light, 1 is the scene's default; at "
+        "`pixels` and `keypoints`",
+    ),
 }
 """Descriptions of the numbers by key, without reward terms and the numbers of each worker and
 camera."""
 OF_WORKERS: dict[str, str] = {
-    "activity": "activity of worker N, as an index; -1: not in the episode",
-    "body": "body of worker N, as an index; -1: not in the episode",
+    "activity": "index of the activity of worker N; -1 if the worker is not in the episode",
+    "body": "index of the body of worker N; -1 if the worker is not in the episode",
     "contact_kind": "kind of the contact with worker N that begins in this step, by the robot's "
-    "motion in the step before: 0 towards the worker, 1 away, 2 neither; -1: none begins",
-    "contact_region": "region of the body that this contact hits, as an index; -1: none",
+    "motion in the previous step: 0 towards the worker, 1 away, 2 neither; -1 if none begins",
+    "contact_region": "index of the body region that this contact hits; -1 if there is none",
 }
 """Meanings of the infos of worker N, which have the keys `worker_N/NAME`, by NAME; N is the
 worker's index."""
@@ -342,7 +375,7 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
     given = [patterns] if isinstance(patterns, str) else patterns
     if not is_sequence_of_text(given):
         raise ConfigError(
-            'infos must be names or patterns of names, as ("cost", "safety/*"), got '
+            'infos must be names or patterns of names, such as ("cost", "safety/*"), got '
             f"{describe(patterns)}."
         )
     for each in given:

@@ -95,9 +95,9 @@ def call_user_function(what: str, function: Callable[..., Any], *given: Any) -> 
 def refuse_writing(what: str, error: ValueError) -> NoReturn:
     """Raise `ConfigError` for a function that writes to its arguments."""
     raise ConfigError(
-        f"{what} writes into an array that it is given ({error}). It may only read it, as others "
-        "are given the same: make a copy first (x = x.copy()), or a new array (x = x - y in place "
-        "of x -= y)."
+        f"{what} writes to an array that it receives ({error}). Such arrays are shared and "
+        "read-only: make a copy first (x = x.copy()), or create a new array (x = x - y instead of "
+        "x -= y)."
     ) from error
 
 

@@ -196,7 +196,7 @@ def for_json(value: Any, where: str) -> Any:
         if not any(isinstance(part, np.ndarray) for part in parts.values()):
             return for_json(parts, where)
     if value is not None and not isinstance(value, bool | int | float | str):
-        raise ConfigError(f"{where} is a {type(value).__name__}, which JSON cannot hold.")
+        raise ConfigError(f"{where} is a {type(value).__name__}, which JSON cannot represent.")
     return value
 
 
@@ -207,7 +207,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     except OSError as error:
         raise ConfigError(f"The file {path} cannot be read: {error}.") from error
     except ValueError as error:  # from tomllib or the decoder
-        raise ConfigError(f"{path} must be TOML; reading it ended with: {error}") from error
+        raise ConfigError(f"{path} is not valid TOML: {error}") from error
 
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:

@@ -43,7 +43,7 @@ class Registry(UserDict[str, ObjectT]):
         """Register an object, also for child processes; raise `ConfigError` if its name exists."""
         taken = name in self.data and (name in self.own or name not in self.inherited)
         if taken:
-            raise ConfigError(f"There is the {self.kind} {name!r} already; choose another name.")
+            raise ConfigError(f"The {self.kind} {name!r} exists already; choose another name.")
         self.data[name] = thing
         if not (_IMPORTING and _IMPORTING[-1] == ""):
             self.own[name] = _IMPORTING[-1] if _IMPORTING else None
@@ -144,8 +144,8 @@ def _restored(kind: str, name: str, entry: Entry) -> Any:
         except Exception as error:
             reason, cause = f"{type(error).__name__}: {error}", error
     raise ConfigError(
-        f"The {kind} {name!r} was registered in the process that started this one and cannot be "
-        f"brought here ({reason}). Expected is an object that can be pickled, of modules that can "
-        "be imported here; or register it in a Python file and name that in HRC_ENV_IMPORT or "
-        "import_files, which every process imports."
+        f"The {kind} {name!r} was registered in the parent process and cannot be transferred to "
+        f"this one ({reason}). Expected an object that can be pickled, from modules that can be "
+        "imported here. Otherwise, register it in a Python file and name this file in "
+        "HRC_ENV_IMPORT or import_files, so that every process imports it."
     ) from cause

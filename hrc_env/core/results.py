@@ -81,8 +81,8 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with contextlib.suppress(OSError):
             draft.unlink(missing_ok=True)
         raise HRCError(
-            f"{path} cannot be written: {error.strerror}. What is finished is kept; make room, "
-            "or choose another folder, and start the same command again."
+            f"{path} cannot be written: {error.strerror}. Finished parts are kept: free disk "
+            "space, or choose another folder, and start the same command again."
         ) from error
 
 

@@ -104,7 +104,7 @@ def write(snapshot: Snapshot) -> None:
                 Finalize(None, shutil.rmtree, (folder, True), exitpriority=-100)
             write_whole(Path(_STATE.path), pickle.dumps(snapshot))
         except (OSError, HRCError) as error:
-            _warn(f"Child processes will not know the registrations of this one: {error}")
+            _warn(f"Child processes will not have the registrations of this process: {error}")
             return
         _STATE.written = snapshot
 
@@ -129,7 +129,10 @@ def _read(source: str) -> None:
         return
     _STATE.seen = seen
     if not _is_private(Path(source).parent):
-        _warn(f"{source} is ignored: its folder must belong to this user and to nobody else.")
+        _warn(
+            f"{source} is ignored: its folder must be owned by this user and must not be "
+            "writable for others."
+        )
         return
     try:
         found = pickle.loads(Path(source).read_bytes())

@@ -18,8 +18,8 @@ try:
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 except ModuleNotFoundError as missing:
     raise MissingExtraError(
-        f"The engine ray needs {missing.name}, which is not installed. Type: "
-        'pip install "hrc_env[ray]"  (in a checkout: pip install -c constraints.txt -e ".[ray]")'
+        f"The engine ray needs {missing.name}, which is not installed. Install it with: pip "
+        'install "hrc_env[ray]"  (in a checkout: pip install -c constraints.txt -e ".[ray]")'
     ) from missing
 
 VERSION = version("hrc_env")
@@ -72,7 +72,9 @@ def connected(
         try:
             context = ray.init(address=address or "local", **options)
         except AuthenticationError as error:
-            raise _refused(address, error, "it wants a token: RAY_AUTH_TOKEN=...") from error
+            raise _refused(
+                address, error, "the cluster requires a token: RAY_AUTH_TOKEN=..."
+            ) from error
         except (ConnectionError, RuntimeError, ValueError, RayError) as error:
             raise _refused(address, error, _remedy(str(error))) from error
         if dashboard and (url := getattr(context, "dashboard_url", "")):
@@ -99,7 +101,7 @@ def _refused(address: str | None, error: Exception, remedy: str) -> ConfigError:
     """Return the error for a cluster that cannot be used."""
     where = "on this machine" if address is None else f"at {address!r}"
     said = " ".join(str(error).split())[:400]
-    return ConfigError(f"No cluster of Ray {where}: {remedy}. ({said})")
+    return ConfigError(f"No Ray cluster was found {where}: {remedy}. ({said})")
 
 
 def _remedy(said: str) -> str:
@@ -107,10 +109,13 @@ def _remedy(said: str) -> str:
     if "ersion mismatch" in said:
         return "all machines must have the same versions of Ray and of Python"
     if "oken" in said:
-        return "it wants a token: RAY_AUTH_TOKEN=..., or a file named by RAY_AUTH_TOKEN_PATH"
+        return (
+            "the cluster requires a token: RAY_AUTH_TOKEN=..., or a file named by "
+            "RAY_AUTH_TOKEN_PATH"
+        )
     return (
-        "start one with `ray start --head`, join it from other machines with "
-        "`ray start --address=HOST:6379`, and name it as auto, HOST:6379 or ray://HOST:10001"
+        "start one with `ray start --head`, join it from other machines with `ray start "
+        "--address=HOST:6379`, and set --address to auto, HOST:6379 or ray://HOST:10001"
     )
 
 
@@ -134,7 +139,7 @@ def share_of(workers: int, machines: list[Machine], note: Note = print) -> float
     n = sum(each.n_cores for each in machines)
     if workers <= n:
         return 1.0
-    note(f"{workers} workers on {n:g} cores: they take turns, and nothing is faster.")
+    note(f"{workers} workers on {n:g} cores: the workers take turns, so that this is not faster.")
     least = min(each.n_cores / -(-workers * each.n_cores // n) for each in machines)
     return int(least * 1000) / 1000
 
@@ -163,12 +168,14 @@ def check_machines(
         done, waiting = ray.wait(waiting, timeout=20)
         if not done:
             where = ", ".join(sorted({asked[each].address for each in waiting}))
-            note(f"Waiting for {where}: kernels are compiled there, once. {SETUP}")
+            note(
+                f"Waiting for {where}: kernels are compiled there, which happens only once. {SETUP}"
+            )
         for each in done:
             _check_answer(each, asked[each])
 
 
-SETUP = "`python -m hrc_env setup` on each machine, or in their image, does so before."
+SETUP = "To compile them in advance, run `python -m hrc_env setup` on each machine or in its image."
 
 
 def _on(machine: Machine) -> Any:
@@ -194,8 +201,8 @@ def _check_answer(answer: Any, machine: Machine) -> None:
         raise ConfigError(f"Machine {machine.address} cannot work: {reason_of(error)}") from error
     if theirs != VERSION:
         raise ConfigError(
-            f"Machine {machine.address} has hrc_env {theirs}, and this one {VERSION}: all must "
-            "have the same."
+            f"Machine {machine.address} has hrc_env {theirs}, but this one has {VERSION}: all must "
+            "have the same version."
         )
 
 
@@ -211,9 +218,10 @@ def reason_of(error: BaseException) -> str:
         name = said.rpartition(missing)[2].split("'")[1]
         package = name.partition(".")[0]
         remedy = (
-            f'pip install "hrc_env[ray]=={VERSION}" there, in the same Python'
+            f'pip install "hrc_env[ray]=={VERSION}" there, in the same Python environment'
             if package == "hrc_env"
-            else "install it there; or name a Python file with --import, which travels"
+            else "install it there, or pass a Python file with --import, which is sent to all "
+            "machines"
         )
         return f"it cannot import {name!r}: {remedy}."
     return said if isinstance(found, HRCError) else f"{type(found).__name__}: {said[-600:]}"

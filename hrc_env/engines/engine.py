@@ -75,9 +75,9 @@ def engine_called(
     if workers is not None:
         check_integer("workers", workers, 1, 100_000)
     if workers is not None and name in (None, "serial"):
-        raise ConfigError("--workers goes with --engine processes or --engine ray.")
+        raise ConfigError("--workers requires --engine processes or --engine ray.")
     if address is not None and name != "ray":
-        raise ConfigError(f"--address is of a cluster of Ray, as with --engine ray, got {name}.")
+        raise ConfigError(f"--address requires --engine ray, got {name!r}.")
     if name == "ray":
         from hrc_env.engines.ray_tasks import RayTasks  # here: Ray is an extra
 

@@ -65,9 +65,9 @@ class Processes:
                 deaths += 1
                 if deaths == ATTEMPTS:
                     raise HRCError(
-                        f"Worker processes died {deaths} times before call "
-                        f"{min(left) + 1} of {len(calls)} was done: killed, or out of memory. "
-                        "What is finished is kept; fewer --workers need less memory."
+                        f"Worker processes died {deaths} times before call {min(left) + 1} of "
+                        f"{len(calls)} was finished: they were killed or ran out of memory. "
+                        "Finished parts are kept; fewer --workers need less memory."
                     ) from error
 
     def _run_once(self, calls: dict[int, Call]) -> Iterator[Done]:

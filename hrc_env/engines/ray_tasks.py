@@ -77,6 +77,6 @@ def _fetch(answer: Any, k: int) -> TimedResult:
         raise HRCError(f"A worker of Ray failed: {cluster.reason_of(error)}") from error
     except RayError as error:
         raise HRCError(
-            f"The worker of call {k + 1} died {ATTEMPTS} times: {cluster.reason_of(error)} What is "
-            "finished is kept."
+            f"The worker of call {k + 1} died {ATTEMPTS} times: {cluster.reason_of(error)} "
+            "Finished parts are kept."
         ) from error

@@ -39,7 +39,8 @@ class Registrations:
             except Exception as error:  # raised by a user's file
                 raise HRCError(
                     f"{path} cannot be imported on this worker ({type(error).__name__}: {error}). "
-                    "Only the file itself travels: what it imports must be installed there."
+                    "Only the file itself is sent: the modules that it imports must be installed "
+                    "on the worker."
                 ) from error
         entries = {
             kind: {

@@ -92,7 +92,7 @@ class EpisodeSet(Sequence[Episode]):
             return [self[j] for j in range(*k.indices(len(self)))]
         n = len(self)
         if isinstance(k, int | np.integer) and not -n <= k < n:  # ends a loop over the set
-            raise IndexError(f"There are {n} episodes in {self.path}, got number {k}.")
+            raise IndexError(f"{self.path} has {n} episodes, got index {k}.")
         return _make_episode(
             read_arrays(self.path / format_file_name(check_integer("number", k, -n, n - 1) % n))
         )
@@ -118,12 +118,14 @@ def load_episodes(path: str | Path) -> EpisodeSet:
     if not about.is_file():
         draft = get_draft_path(folder)
         hint = (
-            f"Its recording was stopped: the same command continues it from {draft}."
+            f"Its recording was interrupted: the same command continues it from {draft}."
             if draft.exists()
-            else "python -m hrc_env record --folder makes one; minari.load_dataset(NAME) loads "
+            else "python -m hrc_env record --folder creates one; minari.load_dataset(NAME) loads "
             "data sets of record --out."
         )
-        raise ConfigError(f"{folder} is no folder of recorded episodes: {ABOUT} is missing. {hint}")
+        raise ConfigError(
+            f"{folder} is not a folder of recorded episodes: {ABOUT} is missing. {hint}"
+        )
     try:
         metadata = json.loads(about.read_text())
         form = int(metadata["format"])
@@ -131,7 +133,7 @@ def load_episodes(path: str | Path) -> EpisodeSet:
         raise ConfigError(f"{about} cannot be read: {type(error).__name__} {error}.") from error
     if form > FORMAT:
         raise ConfigError(
-            f"{about} has format {form}, and this version reads formats up to {FORMAT}: install "
+            f"{about} has format {form}, but this version reads formats up to {FORMAT}: install "
             f"the version of hrc_env that recorded it ({metadata.get('hrc_env')})."
         )
     return EpisodeSet(folder, metadata)

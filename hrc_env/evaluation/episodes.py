@@ -138,8 +138,8 @@ def evaluate_episodes(
         make = partial(registry.make_agent, carried(make), trust=trust)
     if not callable(make):
         raise ConfigError(
-            "evaluate takes a function that makes an agent for an EnvInfo, or an agent as "
-            f"make_agent takes it, got {type(make).__name__}."
+            "evaluate takes a function that makes an agent for an EnvInfo, or an agent that "
+            f"make_agent accepts, got {type(make).__name__}."
         )
     return play_shards(make, n_episodes, seed, engine, tick, **kwargs)
 
@@ -282,8 +282,9 @@ def describe_contradiction(score: Score) -> str:
     if score.is_success > 0 or score.success_rate < 0.5:
         return ""
     return (
-        f"{score.success_rate:.0%} of the attempts were achieved (Task.achieved over the sum with "
-        "Task.failed), but no episode ended with is_success: the task defines the two differently."
+        f"{score.success_rate:.0%} of the attempts were achieved (Task.achieved / (Task.achieved + "
+        "Task.failed)), but no episode ended with is_success: the task defines achieved attempts "
+        "and success differently."
     )
 
 

@@ -59,7 +59,7 @@ def film_episode(
     """
     level = kwargs.get("perception", "pixels")
     make_ready(Console(), level, draws=True)
-    Console().print(f"Making the environment: perception {level} ...")
+    Console().print(f"Creating the environment: perception {level} ...")
     env = HRCEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
@@ -85,7 +85,7 @@ def find_nearest_seed(
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
     with closing(HRCEnv(**kwargs)) as env:
         limit = n_steps or _get_time_limit(env)
-        tried = track(list(seeds), "looking for an encounter")
+        tried = track(list(seeds), "searching for an encounter")
         closest_m = {seed: _find_closest_m(env, make, seed, limit) for seed in tried}
     free = [seed for seed, distance_m in closest_m.items() if distance_m > CLOSE_M]
     if free:

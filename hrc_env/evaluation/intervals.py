@@ -211,13 +211,13 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
     events = _check_column("counts", counts)
     if not (np.isfinite(events).all() and (events >= 0).all() and (events % 1 == 0).all()):
         raise ConfigError(
-            "counts must be whole numbers from 0 on, one per seed; estimate_mean takes other "
-            f"numbers; got {describe(counts)}."
+            "counts must be non-negative integers, one per seed (use estimate_mean for other "
+            f"numbers); got {describe(counts)}."
         )
     if np.ndim(exposure) and len(_check_column("exposure", exposure)) != len(events):
         raise ConfigError(
             f"counts and exposure must have the same seeds, got {len(events)} and "
-            f"{np.size(exposure)} numbers; a single number is the exposure of all seeds."
+            f"{np.size(exposure)} numbers; a single number applies to all seeds."
         )
     if not np.all(np.asarray(exposure, float) >= 0):
         raise ConfigError(f"exposure must not be negative, got {describe(exposure)}.")

@@ -152,7 +152,7 @@ def claim_folder(
     owner, given = read_owner(out), None if settings is None else _normalize(settings)
     differs = ""
     if owner not in (None, name):
-        differs = f"the results of {owner!r}; this is {name!r}"
+        differs = f"the results of {owner!r}; this study is {name!r}"
     elif owner is not None and given is not None and (found := _read_settings(out)) is not None:
         differs = "; ".join(_list_differences(found, given))
         differs = differs and f"results of {name!r} with other settings: {differs}"
@@ -229,5 +229,5 @@ def read_owner(out: Path) -> str | None:
                 content = json.loads(path.read_text())
                 return str(content["experiment"] if path.name == LABEL else "another benchmark")
             except (json.JSONDecodeError, KeyError, TypeError):
-                return f"something unreadable ({path.name})"
+                return f"an unreadable file ({path.name})"
     return None

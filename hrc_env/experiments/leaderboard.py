@@ -31,17 +31,17 @@ SETUPS = {
 }
 """Perception setups with their descriptions, by name. Delayed images carry time stamps."""
 COLUMNS = (
-    per_minute(ACHIEVED, "goals a minute", name="goals_per_minute"),
+    per_minute(ACHIEVED, "goals per minute", name="goals_per_minute"),
     share_of_tries("success", digits=2),
     *(
         rate(f"contacts_{kind}", words, name=f"{kind}_per_hour", per="hour", digits=0)
         for kind, words in zip(
             ("towards", "fleeing", "standing"),
-            ("contacts an hour: towards", "fleeing", "standing"),
+            ("contacts per hour: towards", "fleeing", "standing"),
             strict=True,
         )
     ),
-    per_minute("cost", "cost a minute"),
+    per_minute("cost", "cost per minute"),
     rate([f"contacts_{kind}" for kind in KINDS], name="contacts_per_hour", per="hour"),
 )
 ABOUT = """\
@@ -135,11 +135,11 @@ def make_study(
 
 
 ENTRY_METRICS = {
-    "goals_per_minute": "goals a minute",
+    "goals_per_minute": "goals per minute",
     "success": "success",
-    "cost_per_minute": "cost a minute",
-    "towards_per_hour": "contacts towards an hour",
-    "contacts_per_hour": "contacts an hour",
+    "cost_per_minute": "cost per minute",
+    "towards_per_hour": "contacts towards per hour",
+    "contacts_per_hour": "contacts per hour",
 }
 """Metrics in an entry for each task and condition, with their headings on the leaderboard."""
 Scores = Mapping[str, Metric]
@@ -171,7 +171,7 @@ def read_entry(path: Path) -> Entry:
         version, scores = content.pop("version"), content.pop("scores")
         if version != VERSION:
             raise ConfigError(
-                f"{path} is of version {version} of the benchmark, and this is version {VERSION}: "
+                f"{path} is of version {version} of the benchmark, but this is version {VERSION}: "
                 "their numbers are not comparable. Run python -m hrc_env benchmark again."
             )
         metrics = {key: Metric(v, low, high, "", n) for key, (v, low, high, n) in scores.items()}
@@ -179,7 +179,7 @@ def read_entry(path: Path) -> Entry:
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, ConfigError):
             raise
-        raise ConfigError(f"{path} is not an entry of the benchmark ({error!r}).") from error
+        raise ConfigError(f"{path} is not a result of the benchmark ({error!r}).") from error
 
 
 def write_entry(path: Path, entry: Entry) -> None:

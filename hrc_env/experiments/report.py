@@ -182,7 +182,7 @@ def describe_quick_run(
     n: int,
     seconds: float | tuple[float, float],
     unit: str = "seed",
-    consequence: str = "too few to compare anything",
+    consequence: str = "too few for comparisons",
 ) -> str:
     """Return the warning in the report of a quick run.
 

@@ -189,8 +189,8 @@ class Study:
         if row.baseline is None:
             if paired:
                 raise ConfigError(
-                    f"Row {name!r} of {self.name!r} names no baseline, and {paired[0]!r} compares "
-                    "it with one; it can be the row itself."
+                    f"Row {name!r} of {self.name!r} has no baseline, which {paired[0]!r} requires; "
+                    "a row can be its own baseline."
                 )
             return
         check_names(f"baseline of row {name!r}, a row,", [row.baseline], self.rows)

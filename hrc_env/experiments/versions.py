@@ -39,8 +39,8 @@ def read_versions(path: Path | None = None) -> dict[str, int]:
     path = path or find_behaviour()
     if not path.is_file():
         raise ConfigError(
-            f"There is no {path.name} with the version of each subsystem. In a clone, "
-            f"`git checkout {path.name}` brings it back; else install the package again."
+            f"The file {path.name} with the version of each subsystem is missing. In a clone, "
+            f"restore it by `git checkout {path.name}`; otherwise reinstall the package."
         )
     try:
         versions = tomllib.loads(path.read_text())
@@ -52,7 +52,7 @@ def read_versions(path: Path | None = None) -> dict[str, int]:
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
             given = "nothing" if version is None else repr(version)
             raise ConfigError(
-                f"{path.name} must give {name} a whole number from 1 on, and gives {given}."
+                f"{path.name} must give {name} a whole number from 1 on, got {given}."
             )
     return versions
 
@@ -63,7 +63,7 @@ def check_subsystems(subsystems: Iterable[str]) -> None:
     if not names:
         raise ConfigError(
             "A study must name the subsystems that its numbers depend on, at least one of "
-            f"{', '.join(SUBSYSTEMS)}; it names none."
+            f"{', '.join(SUBSYSTEMS)}; got none."
         )
     check_names("subsystem", names, SUBSYSTEMS)
 

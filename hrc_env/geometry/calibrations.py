@@ -69,7 +69,7 @@ def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[Cam
             except ConfigError as error:
                 raise ConfigError(f"{path}, table {key!r}: {error}") from error
     if not cameras:
-        raise ConfigError(f"{path} holds no camera that is not to be ignored.")
+        raise ConfigError(f"{path} contains no cameras except ignored ones.")
     return _convert_to_metres(cameras, path)
 
 
@@ -85,7 +85,7 @@ def _parse_camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
     missing = [word for word in ENTRIES if word not in table or table[word] in ("null", [], None)]
     if missing:
         has_no_pose = {"rotation", "translation"} & {*missing}
-        hint = " It has no place in the world yet: calibrate its extrinsics." if has_no_pose else ""
+        hint = " It has no pose in the world yet: calibrate its extrinsics." if has_no_pose else ""
         raise ConfigError(f"it must have {', '.join(ENTRIES)}; missing {', '.join(missing)}.{hint}")
     size = _parse_numbers(table, "size", (2,))
     matrix = _parse_numbers(table, "matrix", (3, 3))
@@ -128,16 +128,17 @@ def _convert_to_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[C
     if unit_m != 1.0:
         far_m = unit_m * max(math.dist(a, b) for a in eyes for b in eyes)
         remarks.append(
-            "lengths were taken to be in millimetres: the cameras are up to "
-            f"{far_m:.2f} m from each other. Multiply the translations if that is wrong"
+            f"lengths were interpreted as millimetres; the cameras are up to {far_m:.2f} m from "
+            "each other. Rescale the translations if this is wrong"
         )
     upright = -np.mean([axes_of(camera)[:, 1] for camera in cameras], axis=0)
     axis = int(np.argmax(np.abs(upright)))
     if abs(upright[axis]) > MIN_UPRIGHT and (axis != 2 or upright[2] < 0.0):
         name = ("+" if upright[axis] > 0.0 else "-") + "xyz"[axis]
         remarks.append(
-            f"its world's {name} axis seems to be up, as the images are upright along it; here +z "
-            "is up, and the robot stands at the origin. Turn the calibration's world"
+            f"the {name} axis of its world seems to point up, as the images are upright along it; "
+            "hrc_env expects +z to point up and the robot at the origin. Rotate the world frame of "
+            "the calibration"
         )
     if remarks:
         warnings.warn(f"{path}: {'; '.join(remarks)}.", UserWarning, stacklevel=2)

@@ -84,7 +84,7 @@ class CameraConfig:
         if not np.isfinite(places).all():
             _refuse(self, "eye_world, target_world and roll_deg must be finite", places)
         if math.dist(self.eye_world, self.target_world) < 1e-3:
-            _refuse(self, "it must look at another place than where it hangs", self.eye_world)
+            _refuse(self, "its target must differ from its position", self.eye_world)
         for name, least, most in (
             ("width_px", *SIZE_PX),
             ("height_px", *SIZE_PX),
@@ -155,7 +155,10 @@ class CameraConfig:
             valid = "K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew"
             raise ConfigError(f"Camera {name!r}: {valid}, got {matrix.tolist()}.")
         if T.shape != (4, 4) or not _is_pose(T):
-            valid = "T_world_from_cam must be (4, 4), a rotation and a place above 0, 0, 0, 1"
+            valid = (
+                "T_world_from_cam must be (4, 4): a rotation and a position, with the last row "
+                "0, 0, 0, 1"
+            )
             raise ConfigError(f"Camera {name!r}: {valid}, got {T.tolist()}.")
         lens = distortion if isinstance(distortion, Lens) else make_lens(distortion, fisheye)
         eye, target = T[:3, 3], T[:3, 3] + T[:3, 2]
@@ -220,8 +223,8 @@ def make_lens(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Le
     model = ("kannala_brandt" if fisheye else "brown_conrady") if values or fisheye else "none"
     if len(values) > len(COEFFICIENTS[model]):
         raise ConfigError(
-            f"Distortion of a lens may have {', '.join(COEFFICIENTS[model])}; got "
-            f"{len(values)} coefficients. Calibrate it with no more, or undistort its images."
+            f"Distortion of a lens may have {', '.join(COEFFICIENTS[model])}; got {len(values)} "
+            "coefficients. Calibrate it with at most as many, or undistort its images."
         )
     return Lens(model, tuple(values))
 
@@ -263,7 +266,7 @@ def _focal_px(camera: CameraConfig) -> float:
     radius = distorted_radius(camera.lens, half_rad)
     if math.isnan(radius):
         half = f"{camera.hfov_deg / 2:g} degrees from the axis"
-        _refuse(camera, f"its lens must not fold the image over before {half}", camera.lens)
+        _refuse(camera, f"the projection by its lens must be monotonic up to {half}", camera.lens)
     return camera.width_px / 2 / radius
 
 
@@ -280,8 +283,8 @@ def _check_image(camera: CameraConfig, K: Floats) -> None:
     if np.isnan(rays_cam(camera.lens, (middles - centre) / focal * (1 - 1e-9))).any():
         _refuse(
             camera,
-            "its lens must let light through to the middle of each of the image's edges (weaker "
-            "coefficients or longer focal lengths)",
+            "its lens must reach the center of each edge of the image (use weaker coefficients or "
+            "longer focal lengths)",
             f"{camera.lens} with focal lengths {focal} px",
         )
 
@@ -319,9 +322,9 @@ def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
     tables = type(entries) is list and all(isinstance(entry, dict) for entry in entries)
     if others or not tables or not entries:
         raise ConfigError(
-            f"{path} must hold a [[camera]] for each camera and nothing else, "
-            f"got {', '.join(map(repr, others)) or 'no camera'}. A calibration of another tool has "
-            "a table with size, matrix, distortions, rotation and translation for each."
+            f"{path} must contain a [[camera]] table for each camera and nothing else, got "
+            f"{', '.join(map(repr, others)) or 'no camera'}. A calibration by another tool has a "
+            "table with size, matrix, distortions, rotation and translation for each."
         )
     try:
         return tuple(parse_camera(entry, f"camera[{k}]") for k, entry in enumerate(entries))

@@ -151,7 +151,9 @@ def _place_capsules(chain: SerialChain, frames: Transforms) -> Capsules:
 def _check_joints(chain: SerialChain, name: str, values: Floats) -> Floats:
     """Return values (..., N) as an array; raise `ConfigError` if N is not the number of joints."""
     array = np.asarray(values, float)
-    check_shape(f"The last axis of {name}", array.shape[-1:], (chain.n_joints,), "one per joint")
+    check_shape(
+        f"The last axis of {name}", array.shape[-1:], (chain.n_joints,), "one entry per joint"
+    )
     return array
 
 

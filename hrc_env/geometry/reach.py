@@ -66,10 +66,10 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
         if away_m > reach.radius_m:
             x, y, z = np.asarray(target.place_world, float)
             raise ConfigError(
-                f"{task}: {target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of "
-                f"the robot {robot!r}, whose wrist would be {away_m:.2f} m from its shoulder "
-                f"and can be {reach.radius_m:.2f} m away at most. Put it nearer to the robot, or "
-                "choose a longer arm."
+                f"{task}: {target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of the "
+                f"robot {robot!r}: its wrist would be {away_m:.2f} m from its shoulder, but "
+                f"reaches at most {reach.radius_m:.2f} m. Move it closer to the robot, or choose a "
+                "longer arm."
             )
 
 

@@ -30,4 +30,6 @@ class RobotModel:
 
     def __post_init__(self) -> None:
         for name in ("fastest_rad_s", "slew_rad_s2"):
-            check_shape(name, np.shape(getattr(self, name)), (self.chain.n_joints,), "one a joint")
+            check_shape(
+                name, np.shape(getattr(self, name)), (self.chain.n_joints,), "one entry per joint"
+            )

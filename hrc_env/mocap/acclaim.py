@@ -67,13 +67,14 @@ def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
         ConfigError: a file is missing, is damaged, or belongs to another skeleton.
     """
     if path.suffix.lower() == ".asf":
-        raise ConfigError(f"{path.name} is a skeleton without motion; give its .amc file.")
+        raise ConfigError(f"{path.name} is a skeleton without motion; pass the .amc file instead.")
     skeleton = skeleton or _find_skeleton(path)
     ours, theirs = _read_subject(path), _read_subject(skeleton)
     if ours and theirs and ours != theirs:
         raise ConfigError(
-            f"{path.name} is of subject {ours}, {skeleton.name} the skeleton of subject {theirs}, "
-            f"whose bones have other lengths; expected {ours}.asf beside it or as --skeleton."
+            f"{path.name} is of subject {ours}, but {skeleton.name} is the skeleton of subject "
+            f"{theirs}, whose bone lengths differ; expected {ours}.asf in the same folder or as "
+            "--skeleton."
         )
     bones = _read_asf(skeleton)
     return _make_moving(bones, _read_amc(path, bones))
@@ -92,9 +93,9 @@ def _find_skeleton(path: Path) -> Path:
     if len(beside) == 1:
         return beside[0]
     raise ConfigError(
-        f"{path.name} needs its skeleton, an .asf file: none beside it is called "
-        f"{path.stem}.asf. Found there: {', '.join(p.name for p in beside) or 'none'}. "
-        "Give it with --skeleton."
+        f"{path.name} requires its skeleton, an .asf file, but its folder has no {path.stem}.asf. "
+        f"Found there: {', '.join(p.name for p in beside) or 'none'}. Pass the skeleton with "
+        "--skeleton."
     )
 
 
@@ -167,12 +168,12 @@ def _check_skeleton(skeleton: _Skeleton, done: list[str], source: str) -> None:
     missing = [part for part in ("units", "root", "bonedata", "hierarchy") if part not in done]
     if missing or not skeleton.parent:
         raise ConfigError(
-            f"{source} is no whole ASF skeleton: it lacks "
+            f"{source} is not a complete ASF skeleton: it lacks "
             f"{', '.join(':' + part for part in missing or ['hierarchy'])}."
         )
     strangers = sorted(set(skeleton.parent) - set(skeleton.bones))
     if strangers:
-        raise ConfigError(f"{source}: its hierarchy names bones without data: {strangers}.")
+        raise ConfigError(f"{source}: its hierarchy contains bones without data: {strangers}.")
     for name, bone in skeleton.bones.items():
         if any(freedom not in FREEDOMS for freedom in bone.freedoms):
             raise ConfigError(
@@ -199,14 +200,16 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
         elif len(words) == 1 and words[0].isdigit():
             frames.append({})
         elif not frames:
-            raise ConfigError(f"{path.name} is no AMC file: expected frame 1, got {words[0]!r}.")
+            raise ConfigError(
+                f"{path.name} is not an AMC file: expected frame 1, got {words[0]!r}."
+            )
         else:
             frames[-1][words[0]] = rows.to_numbers(words[1:])
     moving = {name: len(bone.freedoms) for name, bone in skeleton.bones.items() if bone.freedoms}
     if strangers := sorted(set().union(*frames) - set(skeleton.bones)):
         raise ConfigError(
-            f"{path.name} belongs to another skeleton: it moves {', '.join(strangers)}; this one "
-            f"has {', '.join(skeleton.bones)}."
+            f"{path.name} belongs to another skeleton: it moves {', '.join(strangers)}; the bones "
+            f"of this one are {', '.join(skeleton.bones)}."
         )
     whole = [f for f in frames if all(len(f.get(name, ())) == n for name, n in moving.items())]
     if len(whole) < FEWEST_FRAMES or whole != frames[: len(whole)] or len(frames) > len(whole) + 1:
@@ -217,12 +220,12 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
             if len(there.get(name, ())) != n
         ]
         raise ConfigError(
-            f"{path.name} is cut off or belongs to another skeleton: {len(whole)} of its "
-            f"{len(frames)} frames have a number for each freedom of every bone"
-            + (f"; in the first, {', '.join(wrong)}." if wrong else ".")
+            f"{path.name} is truncated or belongs to another skeleton: {len(whole)} of its "
+            f"{len(frames)} frames have a number for each degree of freedom of every bone"
+            + (f"; in the first frame, {', '.join(wrong)}." if wrong else ".")
         )
     values = {name: np.array([frame[name] for frame in whole]) for name in moving}
-    cut = f"The last frame is cut off: {len(whole)} are used."
+    cut = f"The last frame is truncated: the {len(whole)} frames before it are used."
     return _Motion(values, (cut,) if len(whole) < len(frames) else ())
 
 

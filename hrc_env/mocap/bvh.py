@@ -65,7 +65,7 @@ def read_bvh(path: Path) -> Moving:
     announced = _read_after("frames?", rows, "Frames:")
     seconds = _read_after(r"frame\s*time", rows, "Frame Time:")
     if not np.isfinite(announced):
-        raise rows.make_error("expected how many frames there are")
+        raise rows.make_error("expected the number of frames")
     values, notes = _read_frames(rows, sum(len(node.channels) for node in nodes), int(announced))
     parent = np.array([node.parent for node in nodes])
     poses = _place_nodes(nodes, parent, values)
@@ -166,19 +166,19 @@ def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
     for k, words in enumerate(lines):
         if len(words) != width:
             raise ConfigError(
-                f"{rows.source}: a frame has {width} numbers, one a channel; "
-                f"frame {k + 1} (about line {first + k + 1}) has {len(words)}."
+                f"{rows.source}: a frame has {width} numbers, one per channel; frame {k + 1} "
+                f"(about line {first + k + 1}) has {len(words)}."
             )
     values = _to_numbers(lines, rows.source).reshape(len(lines), width)
     there = len(values)
     if there < max(FEWEST_FRAMES, LEAST_SHARE * announced):
         raise ConfigError(
-            f"{rows.source} is cut off: it announces {announced} frames, {there} are there."
+            f"{rows.source} is truncated: it declares {announced} frames, but contains {there}."
         )
     if there == announced:
         return _Frames(values, ())
     kept = min(there, announced) if announced >= FEWEST_FRAMES else there
-    note = f"{announced} frames are announced, {there} are there: {kept} are used."
+    note = f"{announced} frames are declared, but {there} are present: {kept} are used."
     return _Frames(values[:kept], (note,))
 
 
@@ -226,7 +226,7 @@ def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses
         elif usual < NEAR_ZERO * np.linalg.norm(position):
             offset[:, node] += position
             added.append(nodes[node].name)
-    note = f"Places of {', '.join(added)} are near 0 and were added to OFFSET."
+    note = f"Positions of {', '.join(added)} are near 0 and were added to OFFSET."
     return _NodePoses(offset, rotation, stated, (note,) if added else ())
 
 

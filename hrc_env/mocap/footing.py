@@ -52,7 +52,7 @@ FLOOR_M = (-0.03, 0.09)
 """Range of the height of the tips of standing feet for which the file's floor is accepted [m]."""
 SOLE_M = 0.03
 """Assumed height of the tips of feet above the floor [m]; 0.01 to 0.04 in the worker models."""
-ACCEPT = "To play it all the same, as on one floor: --allow-off-floor (allow_off_floor=True)."
+ACCEPT = "To play it on a single floor nevertheless: --allow-off-floor (allow_off_floor=True)."
 
 
 class Support(NamedTuple):
@@ -96,8 +96,8 @@ def put_on_floor(
             faults = (
                 *faults,
                 f"With this skeleton, feet stand {off:+.2f} m above the file's floor; within "
-                f"{SOLE_M - FLOOR_M[0]:.2f} m are expected of the person's own. Give their .asf "
-                "file with --skeleton.",
+                f"{SOLE_M - FLOOR_M[0]:.2f} m are expected with the skeleton of the person. Pass "
+                "their .asf file with --skeleton.",
             )
     if faults and not is_allowed:
         raise ConfigError(f"{source}: {' '.join(faults)} {ACCEPT}")
@@ -147,7 +147,7 @@ def level_floor(joints: Points3, fps: float) -> Repaired:
     angle, left = float(np.arctan(np.linalg.norm(slope))), points[:, 2] - points[:, :2] @ slope
     if not LEAST_TILT_RAD < angle < MOST_TILT_RAD or left.std() > EVEN_M:
         return Repaired(joints, ())
-    note = f"The floor was aslant by {np.degrees(angle):.1f} degrees and has been levelled."
+    note = f"The floor was tilted by {np.degrees(angle):.1f} degrees and has been levelled."
     return Repaired(joints @ _make_levelling(slope).T, (note,))
 
 
@@ -169,19 +169,20 @@ def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
         low, high = np.percentile(height[rests], (2, 98))
         faults.append(
             f"Feet rest at heights from {low:+.2f} to {high:+.2f} m (stairs, terrain, a seat?); "
-            f"within {LEVEL_M} m of one floor are expected."
+            f"heights within {LEVEL_M} m of a single floor are expected."
         )
     hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1) - HAND_M
     off = np.minimum(height, hands - measure_floor_height(joints, fps)) > AIR_M
     first, end = max(find_runs(off), key=lambda run: run.end - run.first, default=Run(0, 0))
     if (end - first) / fps > AIR_S and not faults:
         faults.append(
-            f"Both feet are more than {AIR_M} m above the floor for {(end - first) / fps:.1f} s "
-            f"from {first / fps:.1f} s on (hanging, thrown up?); at most {AIR_S} s are expected."
+            f"Both feet are more than {AIR_M} m above the floor for {(end - first) / fps:.1f} s, "
+            f"beginning at {first / fps:.1f} s (hanging, thrown up?); at most {AIR_S} s are "
+            "expected."
         )
     if rests.mean() < LEAST_SHARE and not _is_running(joints, height, fps):
         faults.append(
-            f"One foot or the other rests for {100 * rests.mean():.0f} % of the time; at least "
+            f"At least one foot rests for {100 * rests.mean():.0f} % of the time; at least "
             f"{100 * LEAST_SHARE:.0f} % are expected of a person on a floor."
         )
     return tuple(faults)

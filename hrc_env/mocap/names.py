@@ -214,7 +214,7 @@ def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
             given[joint.strip()] = node.strip()
         else:
             raise ConfigError(
-                f"Expected JOINT=NAME, such as left_shoulder=lShldr, or a .toml file of such "
+                "Expected JOINT=NAME, such as left_shoulder=lShldr, or a .toml file with such "
                 f"lines, got {entry!r}. Joints: {', '.join(NAMED)}."
             )
     check_names("joint", given, NAMED)

@@ -56,8 +56,8 @@ def check_person(joints: Points3, source: str) -> None:
         usual_m = usual_m * tall
         if not usual_m / (2 * STRANGE) < got_m < usual_m * STRANGE:
             raise ConfigError(
-                f"{source}: no person: {JOINTS[first]} and {JOINTS[second]} are {got_m:.2f} m "
-                f"apart, about {usual_m:.2f} m expected. Are the joints in the order "
+                f"{source}: not a person: {JOINTS[first]} and {JOINTS[second]} are {got_m:.2f} m "
+                f"apart, but about {usual_m:.2f} m expected. Are the joints in the order "
                 f"{', '.join(JOINTS)}?"
             )
 

@@ -77,18 +77,20 @@ def read_recording(
     if source_fps is not None:
         rate_hz = source_fps
     elif np.isnan(rate_hz):
-        rate_hz, notes = CMU_HZ, (*notes, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
+        rate_hz, notes = CMU_HZ, (*notes, f"No frame rate is given: assumed {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
     acclaim = path.suffix.lower() == ".amc"
     upward = Upward(up, read.rest_up)
     placed, repairs = repair_joints(read.joints, rate_hz, source, acclaim, allow_off_floor, upward)
     duration_s = (len(placed) - 1) / rate_hz
     if duration_s < LEAST_S:
-        raise ConfigError(f"{source}: {duration_s:.2f} s of motion; {LEAST_S} s is the least.")
+        raise ConfigError(
+            f"{source}: {duration_s:.2f} s of motion; at least {LEAST_S} s are required."
+        )
     if fps is not None and fps != rate_hz:
-        check_rate(fps, "the wished rate")
+        check_rate(fps, "the requested rate")
         placed = resample(placed, rate_hz, fps)
-        repairs = (*repairs, f"Resampled from {rate_hz:g} to {fps:g} frames a second.")
+        repairs = (*repairs, f"Resampled from {rate_hz:g} to {fps:g} frames per second.")
         rate_hz = fps
     return Capture(placed, rate_hz, read.are_landmarks, read.node_names, source, (*notes, *repairs))
 
@@ -96,12 +98,13 @@ def read_recording(
 def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -> _Content:
     """Read the content of a file of any supported format."""
     if not path.is_file():
-        raise ConfigError(f"{path} is no file.")
+        raise ConfigError(f"{path} is not a file.")
     suffix = path.suffix.lower()
     if suffix == ".npz":
         if joints:
             raise ConfigError(
-                f"{path.name}: joints= is for .bvh and .amc files; an .npz file has no names."
+                f"{path.name}: joints= requires a .bvh or .amc file; an .npz file has no joint "
+                "names."
             )
         read = _read_joints(path)
         return _Content(read.joints, read.fps, True, JOINTS)
@@ -138,7 +141,7 @@ def _read_joints(path: Path) -> _Joints:
             names = tuple(file.files)
             arrays = {name: np.asarray(file[name], float) for name in names if name in wanted}
     except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
-        raise ConfigError(f"{path.name} is cut off or no npz file: {error}.") from None
+        raise ConfigError(f"{path.name} is truncated or not an npz file: {error}.") from None
     missing = [name for name in wanted if name not in arrays]
     if missing:
         raise ConfigError(
@@ -148,8 +151,8 @@ def _read_joints(path: Path) -> _Joints:
     joints, fps = arrays["joints"], arrays["fps"]
     if joints.ndim != 3 or joints.shape[1:] != (N_JOINTS, 3) or len(joints) < FEWEST_FRAMES:
         raise ConfigError(
-            f"{path.name}: joints must be (T >= {FEWEST_FRAMES}, {N_JOINTS}, 3), one row each of "
-            f"{', '.join(JOINTS)}; got {joints.shape}."
+            f"{path.name}: joints must be (T >= {FEWEST_FRAMES}, {N_JOINTS}, 3), with one row for "
+            f"each of {', '.join(JOINTS)}; got {joints.shape}."
         )
     if fps.size != 1:
         raise ConfigError(f"{path.name}: fps must be one number, got shape {fps.shape}.")

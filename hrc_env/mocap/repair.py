@@ -121,7 +121,7 @@ def add_shift(joints: Points3, shift: Points3) -> Repaired:
     )
     if off < OFF_FLOOR or shifted > ON_FLOOR:
         return Repaired(joints, ())
-    note = "Places were added to OFFSET: so the feet are on the floor."
+    note = "Positions were added to OFFSET, which places the feet on the floor."
     return Repaired(joints + shift[:, None], (note,))
 
 
@@ -136,14 +136,14 @@ def fill_gaps(joints: Points3, fps: float, source: str) -> Repaired:
         first, end = max(gaps, key=lambda gap: gap.end - gap.first)
         if (end - first) / fps > LONGEST_GAP_S:
             raise ConfigError(
-                f"{source}: {joint} is missing for {(end - first) / fps:.2f} s from frame "
-                f"{first}; gaps of up to {LONGEST_GAP_S} s are filled. Cut the clip there."
+                f"{source}: {joint} is missing for {(end - first) / fps:.2f} s from frame {first}; "
+                f"only gaps of up to {LONGEST_GAP_S} s are filled. Split the clip there."
             )
         at = np.flatnonzero(known)
         for i in range(3):
             filled[:, j, i] = np.interp(np.arange(len(joints)), at, joints[at, j, i])
         names.append(f"{joint} ({np.sum(~known)} frames)")
-    note = f"Missing joints were filled in: {', '.join(names)}."
+    note = f"Missing joints were interpolated: {', '.join(names)}."
     return Repaired(filled, (note,) if names else ())
 
 
@@ -152,7 +152,7 @@ def convert_to_metres(joints: Points3, source: str) -> Repaired:
     tall = measure_stature(joints)
     for name, unit_m in UNITS.items():
         if STATURES_M[0] < tall * unit_m < STATURES_M[1]:
-            note = f"Lengths are taken to be in {name}: the person is {tall * unit_m:.2f} m tall."
+            note = f"Lengths are interpreted as {name}: the person is {tall * unit_m:.2f} m tall."
             return Repaired(joints * unit_m, (note,) if unit_m != 1.0 else ())
     raise ConfigError(
         f"{source}: a person {tall:.4g} tall in the file's unit; expected "
@@ -193,9 +193,9 @@ def _find_upward_axis(joints: Points3, source: str, at_rest: Floats | None) -> s
     if np.max(np.abs(begin)) >= STRAIGHT:
         return _name_axis(begin)
     raise ConfigError(
-        f"{source}: which axis is up? From ankles to shoulders the person points to "
-        f"{np.round(mean, 2).tolist()} on the mean; at least {STEADY} along one axis is "
-        "expected, as of somebody who is mostly on their feet. If you know it: --up=+y (up='+y')."
+        f"{source}: the upward axis is unclear. The mean direction from ankles to shoulders is "
+        f"{np.round(mean, 2).tolist()}; a component of at least {STEADY} along one axis is "
+        "expected of a person who mostly stands. If you know the axis: --up=+y (up='+y')."
     )
 
 
@@ -216,12 +216,12 @@ def undo_mirroring(joints: Points3, source: str) -> Repaired:
     if feet > 0.0 and knees > -KNEES:
         return Repaired(joints, ())
     if feet < 0.0 and knees < KNEES:
-        note = "The person was their own mirror image (two axes exchanged); mirrored back."
+        note = "The person was mirrored (two axes are swapped); this was corrected."
         return Repaired(joints * np.array([1.0, -1.0, 1.0]), (note,))
     raise ConfigError(
         f"{source}: feet point {'for' if feet > 0 else 'back'}ward, but knees bend "
-        f"{'for' if knees > 0 else 'back'}ward: left and right are exchanged in some joints only. "
-        "Exchange them in shoulders, hips, knees, ankles and feet alike."
+        f"{'for' if knees > 0 else 'back'}ward: left and right are swapped in only some joints. "
+        "Swap them consistently in shoulders, hips, knees, ankles and feet."
     )
 
 
@@ -270,6 +270,6 @@ def skip_rest_pose(joints: Points3) -> FirstFrame:
     shape = joints - joints[:, [JOINT["left_hip"]]]
     jumps = np.linalg.norm(np.diff(shape, axis=0), axis=-1).mean(-1)
     if jumps[0] > max(JUMP_M, JUMP * jumps[1:AFTER].max(initial=0.0)):
-        note = "The first frame is another pose than the motion (a T-pose?): left out."
+        note = "The first frame shows a different pose from the motion (a T-pose?) and is left out."
         return FirstFrame(1, (note,))
     return FirstFrame(0, ())

@@ -74,7 +74,7 @@ class Rows:
         for words in self.remaining():
             return words
         raise ConfigError(
-            f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
+            f"{self.source} is truncated: after its {len(self._lines)} lines {expected} is missing."
         )
 
     def remaining(self) -> Iterator[list[str]]:

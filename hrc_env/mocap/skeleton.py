@@ -80,14 +80,14 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
     if head is None and {"left_shoulder", "right_shoulder"} <= {*nodes}:
         head = _find_top(nodes, names, parent)
         if head is not None:
-            notes.append(f"The head was taken to be {names[head]}: the trunk ends there.")
+            notes.append(f"The head is assumed to be {names[head]}, where the trunk ends.")
     missed = [joint for joint in JOINTS[1:] if joint not in nodes]
     missed += ["head"] if head is None else []
     if missed or head is None:
         there = [f"{joint} = {names[nodes[joint]]}" for joint in JOINTS if joint in nodes]
         raise ConfigError(
-            f"{source}: an unknown skeleton. Missed: {', '.join(missed)}. Found: "
-            f"{', '.join(there) or 'none'}. The file has: {', '.join(names)}. Say which is which "
+            f"{source}: an unknown skeleton. Missing: {', '.join(missed)}. Found: "
+            f"{', '.join(there) or 'none'}. The file has: {', '.join(names)}. Name the joints "
             f"(--joint {missed[0]}=NAME, joints={{{missed[0]!r}: NAME}}), or rename them as in "
             "docs/motion_capture.md."
         )
@@ -160,7 +160,7 @@ def _infer_middle_joints(
             for side, (node, top, end) in inferred.items():
                 known[side + part] = [_Candidate(0.0, node)]
                 yield (
-                    f"{side + part} was taken to be {names[node]}, which hangs between "
+                    f"{side + part} is assumed to be {names[node]}, which lies between "
                     f"{names[top]} and {names[end]}."
                 )
 

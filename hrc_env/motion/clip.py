@@ -48,7 +48,9 @@ class Clip:
         q, source = self.controls, self.source
         check_rate(self.fps, source)
         if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
-            raise ConfigError(f"{source}: controls must be (T >= 2, {c.N_CONTROLS}): {q.shape}.")
+            raise ConfigError(
+                f"{source}: controls must have shape (T >= 2, {c.N_CONTROLS}), got {q.shape}."
+            )
         check_shape(f"{source}: contacts", self.contacts.shape, (len(q), 2), "frames, feet")
         check_shape(f"{source}: size", self.size.shape, (N_SIZES,), "lengths")
         if not (np.isfinite(q).all() and np.isfinite(self.size).all() and self.size[LEG] > 0.0):
@@ -57,8 +59,8 @@ class Clip:
         speed = np.linalg.norm(np.diff(root, axis=0), axis=-1).max() * self.fps
         if np.abs(root).max() > FARTHEST_M or speed > FASTEST_M_S:
             raise ConfigError(
-                f"{source}: the root goes {np.abs(root).max():.0f} m far at up to {speed:.0f} m/s; "
-                f"at most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
+                f"{source}: the root moves {np.abs(root).max():.0f} m at up to {speed:.0f} m/s; at "
+                f"most {FARTHEST_M:g} m and {FASTEST_M_S:g} m/s are expected of a person."
             )
 
     def __eq__(self, other: object) -> bool:
@@ -121,13 +123,13 @@ def load_clip(path: Path) -> Clip:
             version = int(file["version"]) if "version" in stored else 0
             arrays = {name: file[name] for name in names & stored}
     except FileNotFoundError:
-        raise ConfigError(f"There is no clip {path}.") from None
+        raise ConfigError(f"The clip {path} does not exist.") from None
     except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
-        raise ConfigError(f"{path} is damaged or no clip: {error}.") from None
+        raise ConfigError(f"{path} is damaged or not a clip: {error}.") from None
     if version != VERSION or set(arrays) != names:
         got = f"version {version}" if version else f"arrays {', '.join(sorted(stored)) or 'none'}"
         raise ConfigError(
-            f"{path}: expected a clip of version {VERSION}, got {got}. Make it (anew) with: "
+            f"{path}: expected a clip of version {VERSION}, got {got}. Create it again with: "
             f"python -m hrc_env import-motion RECORDING --out {path}"
         )
     recorded = np.asarray(arrays["controls"], float)
@@ -143,8 +145,9 @@ def check_rate(fps: float, source: str) -> None:
     """Raise `ConfigError` if a frame rate [Hz] is outside of the plausible range."""
     if not SLOWEST_HZ <= fps <= FASTEST_HZ:
         raise ConfigError(
-            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
-            f"expected, the file has {fps:g}. If you know the true one, give it (--source-fps)."
+            f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames per second "
+            f"is expected, but the file has {fps:g}. If you know the correct one, pass it "
+            "(--source-fps)."
         )
 
 

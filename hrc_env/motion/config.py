@@ -201,12 +201,13 @@ class MotionConfig:
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
-                f"spacing_m must be 0.8 or more, or workers would touch: {self.spacing_m}."
+                "spacing_m must be 0.8 or more, as workers would touch otherwise, got "
+                f"{self.spacing_m}."
             )
         check_jobs(self.jobs)
         for motion in self.motions:
             if not isinstance(motion, str | Clip):
-                raise ConfigError(f"motions must hold paths or clips, got {motion!r}.")
+                raise ConfigError(f"motions must be paths or clips, got {motion!r}.")
 
 
 class HandParams(NamedTuple):

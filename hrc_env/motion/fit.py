@@ -52,7 +52,7 @@ def describe_fit(clip: Clip, played: dict[str, float]) -> str:
     whole_s = (len(clip.controls) - 1) / clip.fps
     plays = [f"{name} ({s:.1f} of its {whole_s:.1f} s)" for name, s in played.items() if s > 0.0]
     lacks = [name for name, s in played.items() if s == 0.0]
-    sentences = [f"It plays in {', '.join(plays)}."] if plays else []
+    sentences = [f"It can be played in {', '.join(plays)}."] if plays else []
     if lacks:
-        sentences.append(f"It has no room in {', '.join(lacks)}.")
+        sentences.append(f"There is no room for it in {', '.join(lacks)}.")
     return " ".join(sentences)

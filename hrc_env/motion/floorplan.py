@@ -53,15 +53,15 @@ def make_floorplan(grounds: Grounds) -> Floorplan:
     ys = np.arange(y0, y1 + 0.5 * CELL_M, CELL_M)
     slack, origin = _measure_slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]])
     if slack.max() < 0.0:
-        raise ConfigError("The grounds leave no room for a worker: everything is blocked.")
+        raise ConfigError("There is no room for a worker: the whole floor plan is blocked.")
     for array in (slack, origin):
         array.flags.writeable = False
     grid = FloorGrid(slack, origin)
     for place in grounds.places:
         if read_slack(*place.xy_m, grid) < STAND_M - BODY_M:
             raise ConfigError(
-                f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: expected "
-                f"{STAND_M} m at least from what stands there and inside the walkable area."
+                f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: expected a "
+                f"point at least {STAND_M} m from all objects and inside the walkable area."
             )
     return Floorplan(grid, grounds)
 

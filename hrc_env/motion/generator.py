@@ -167,8 +167,8 @@ def make_state(
     fit = count_room(plan, config.spacing_m)
     if n_workers > fit:
         raise ConfigError(
-            f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
-            f"{config.spacing_m} m from each other."
+            f"n_workers={n_workers}: at most {fit} fit into this scene, {config.spacing_m} m from "
+            "each other."
         )
     clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
     schedule = make_schedule(config.jobs, {place.kind for place in grounds.places})
@@ -253,8 +253,8 @@ def _begin_cast_episode(
         draws = rng.random(draws.shape)
     named = ", ".join(f"{activity_names[activities[w]]!r} of worker_{w}" for w in wrong)
     raise ConfigError(
-        f"No beginning of an episode with {named} was found in {CAST_TRIES} draws: there are fewer "
-        "free places for that than workers. Let fewer workers begin so."
+        f"No start of an episode with {named} was found in {CAST_TRIES} draws: there are fewer "
+        "free positions for it than workers. Let fewer workers begin with this activity."
     )
 
 

@@ -198,7 +198,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
     if len(set(names)) < len(names):
         raise ConfigError(f"Jobs must have different names, got {names}.")
     if not any(job.at == "robot" for job in jobs):
-        raise ConfigError("Some job must be at the robot: at='robot'.")
+        raise ConfigError("At least one job must be at the robot: at='robot'.")
     for job in jobs:
         for noun, got, valid in (
             ("activity of", job.activity, DONE_THERE),

@@ -57,9 +57,9 @@ def begin_apart(
             generator.reset(motion, ids[near], rngs, casts)
         q[near] = draw(ids[near])
     raise ConfigError(
-        f"No start with robot and workers {APART_M} m apart was found in {TRIES} draws: whatever "
-        "start_spread_rad, the task's start, the reset's options and what workers do leave open is "
-        "nearer."
+        f"No start with robot and workers {APART_M} m apart was found in {TRIES} draws: "
+        "start_spread_rad, the task's start, the options of the reset and the workers' activities "
+        "permit only closer ones."
     )
 
 

@@ -101,8 +101,8 @@ def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
     """
     if image.dtype != np.uint8:
         raise ConfigError(
-            f"An image must be of uint8, 0 to 255, got {image.dtype}. Scale it and convert it: "
-            "(255 * image).round().astype(numpy.uint8) of numbers up to 1."
+            f"An image must be of uint8, 0 to 255, got {image.dtype}. Convert an image with values "
+            "from 0 to 1 by (255 * image).round().astype(numpy.uint8)."
         )
     matrix = image_from_crop(window, side)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP

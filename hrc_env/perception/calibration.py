@@ -130,7 +130,7 @@ _SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 LONGEST_TAIL = 3.0
 """Maximum value of `tail`, at which a normal vector n is multiplied by 1 + n.n."""
-_RENEW = "make a new one with: python -m assets.emulator.calibrate --out FILE"
+_RENEW = "create a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
@@ -144,8 +144,8 @@ def changed_ns(path: Path | str) -> int:
         return os.stat(path).st_mtime_ns
     except OSError as error:
         raise ConfigError(
-            f"The calibration file {path} cannot be read ({error.strerror}): name one that "
-            f"exists, leave emulator.calibration empty for the package's own, or {_RENEW}."
+            f"The calibration file {path} cannot be read ({error.strerror}): choose an existing "
+            f"file, leave emulator.calibration empty for the one of the package, or {_RENEW}."
         ) from error
 
 
@@ -155,13 +155,17 @@ def _read(path: Path, changed: int) -> Calibration:
     try:
         content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise ConfigError(f"{path} is no calibration of keypoints ({error}): {_RENEW}.") from error
+        raise ConfigError(
+            f"{path} is not a calibration of keypoints ({error}): {_RENEW}."
+        ) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise ConfigError(f'{path} is no calibration of keypoints ("format" {FORMAT!r}): {_RENEW}.')
+        raise ConfigError(
+            f'{path} is not a calibration of keypoints ("format" {FORMAT!r}): {_RENEW}.'
+        )
     if content.get("version") != VERSION:
         raise ConfigError(
-            f"{path} is a calibration of version {content.get('version')!r}; this hrc_env reads "
-            f"version {VERSION}: {_RENEW}."
+            f"{path} is a calibration of version {content.get('version')!r}, but this version of "
+            f"hrc_env reads version {VERSION}: {_RENEW}."
         )
     tables = content.get("tables")
     given = set(tables) if isinstance(tables, dict) else set()
@@ -192,6 +196,6 @@ def _parse_table(name: str, value: Any, path: Path) -> Floats:
         if good and name in names and not (low <= array.min() and array.max() <= high):
             good, expected = False, f"numbers from {low:g} to {high:g}"
     if not good:
-        raise ConfigError(f"{path}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
+        raise ConfigError(f"{path}: table {name!r} must hold {expected}. Correct it, or {_RENEW}.")
     array.setflags(write=False)
     return array

@@ -209,7 +209,7 @@ class PoseDetector(Stateful):
             folded: whether the worker is expected to bend, squat or kneel (`outline.is_folded`).
             posture: expected posture (`outline.posture_of`).
         """
-        check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
+        check_shape("windows", (len(windows),), (len(self.cameras),), "one entry per camera")
         if any(windows):
             return self._detect_in(source, windows, track, folded, posture)
         known = self.search(source) if found is None else found
@@ -259,7 +259,10 @@ class PoseDetector(Stateful):
         The other detector remains responsible for closing them.
         """
         if lender.config != self.config:
-            raise ConfigError("A detector borrows networks from one of the same settings.")
+            raise ConfigError(
+                "A detector can share the networks of another detector only if both "
+                "have the same settings."
+            )
         self._lender = lender
 
     def close(self) -> None:

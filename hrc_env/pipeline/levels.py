@@ -147,20 +147,20 @@ def check_supported(
     """
     if not (shows_images or _supports(level, appearance)):
         raise ConfigError(
-            f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
-            "perception='pixels' or observe_images. perception='keypoints' knows the strength of "
-            'the light alone: appearance={"light": (0.15, 0.5)}.'
+            f"Appearances need images, but perception={level!r} has none: leave out appearance, or "
+            "use perception='pixels' or observe_images. perception='keypoints' supports only the "
+            'intensity of the light: appearance={"light": (0.15, 0.5)}.'
         )
     if faults and level not in CAMERA_LEVELS:
         raise ConfigError(
-            f"Faults are of cameras; perception={level!r} has none. Leave them out, or use one of "
-            f"{', '.join(map(repr, CAMERA_LEVELS))}."
+            f"Faults need cameras, but perception={level!r} has none. Leave out faults, or use one "
+            f"of {', '.join(map(repr, CAMERA_LEVELS))}."
         )
     images = sorted({f.kind for f in faults if f.group == IMAGE} - {*EMULATED})
     if images and level == "keypoints":
         raise ConfigError(
-            f'Faults of images ({", ".join(images)}) need images: use perception="pixels". What '
-            'they do to the detector is not emulated; perception="keypoints" knows '
+            f'Faults of images ({", ".join(images)}) need images: use perception="pixels". Their '
+            'effects on the detector are not emulated; perception="keypoints" supports '
             f"{', '.join(kind for kind, each in KINDS.items() if each.group != IMAGE)}, "
             f"{', '.join(EMULATED)}."
         )

@@ -78,9 +78,9 @@ class ObservedImages:
             bent = camera.lens.model != "none" and f"{IMAGE}{camera.name}" in self.names
             if bent and not self._bends:
                 raise ConfigError(
-                    f"Camera {camera.name!r} of an episode has a lens, and the environment was "
-                    "made to observe images of cameras without: make it with cameras= that have "
-                    "lenses, or without observe_images."
+                    f"Camera {camera.name!r} of an episode has a lens model, but the environment "
+                    "was created to observe images of cameras without one: create it with cameras= "
+                    "that have lens models, or without observe_images."
                 )
 
     def close(self) -> None:

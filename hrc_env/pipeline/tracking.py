@@ -94,7 +94,7 @@ class PerceptionPipeline(Stateful):
 
         Raises `ConfigError` if there are no cameras.
         """
-        raise ConfigError("Keypoints are of cameras, and this perception level has none.")
+        raise ConfigError("Keypoints need cameras, but this perception level has none.")
 
     @property
     def now_s(self) -> Floats:
@@ -102,7 +102,7 @@ class PerceptionPipeline(Stateful):
 
         Raises `ConfigError` if there are no cameras.
         """
-        raise ConfigError("Frames are of cameras, and this perception level has none.")
+        raise ConfigError("Frames need cameras, but this perception level has none.")
 
     def crops(self, b: int) -> list[Image | None]:
         """Return the last crop (C,) of environment `b`'s first worker in each camera."""

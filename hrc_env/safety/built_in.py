@@ -113,7 +113,7 @@ def limit_command(
 
 def describe_pose(belief: Belief) -> ArmPose:
     """Return the poses of links and capsules. Loads are attached to the last link."""
-    model = require(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
+    model = require(belief.model, "The robot's model (RobotModel) for a built-in shield")
     n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
     links = np.append(model.chain.capsule_link, carried)
@@ -144,7 +144,9 @@ def build_constraints(
     model, batch = pose.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
     if config.kind != "ssm":
-        in_force = require(belief.command, "The command in force, which a built-in shield needs,")
+        in_force = require(
+            belief.command, "The current command of the joints for a built-in shield"
+        )
         most, change = model.fastest_rad_s, model.slew_rad_s2 * dt_s
         low = np.minimum(np.maximum(-most, in_force - change), most)
         high = np.maximum(np.minimum(most, in_force + change), -most)

@@ -49,7 +49,7 @@ class CostConfig:
         check_names("cost component", self.components, COMPONENTS)
         if not self.components or len(set(self.components)) < len(self.components):
             raise ConfigError(
-                f"cost.components must be one or more different ones of {', '.join(COMPONENTS)}, "
+                f"cost.components must be one or more different names of {', '.join(COMPONENTS)}, "
                 f"got {self.components}."
             )
 

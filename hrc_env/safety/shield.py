@@ -105,8 +105,9 @@ def apply_shield(
     pair = output if is_list_or_tuple(output) else ()
     if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
-            "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {describe(cast(object, output))}."
+            "A shield must return a pair: the allowed velocities (B, joints) and a mapping from "
+            "names to values (B,), which may be empty ({}); got "
+            f"{describe(cast(object, output))}."
         )
     allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
     values = _check_values(pair[1], len(command))
@@ -126,11 +127,11 @@ def _check_values(values: Mapping[Any, Any], batch: int) -> dict[str, Floats]:
     checked: dict[str, Floats] = {}
     for name, value in values.items():
         if not isinstance(name, str):
-            raise ConfigError(f"The values of a shield must have names, got {name!r}.")
+            raise ConfigError(f"Keys of a shield's values must be names, got {name!r}.")
         if name in MEASURED:
             raise ConfigError(
-                f"A shield of your own must not return a value {name!r}, which is measured of "
-                f"every shield: choose another name than {', '.join(map(repr, MEASURED))}."
+                f"A custom shield must not return the value {name!r}, which is measured for every "
+                f"shield: choose a name other than {', '.join(map(repr, MEASURED))}."
             )
         words = f"The value {name!r} of a shield"
         checked[name] = numbers_of(words, value, (batch,), "B", finite=False)
@@ -143,8 +144,8 @@ def _warn_of_speed(allowed: JointVelocities, limit_rad_s: Floats) -> None:
     if (over > 1.0 + 1e-9).any():
         joint = int(over.argmax())
         warnings.warn(
-            f"A shield lets joint {joint} go {over[joint]:.3g} times as fast as it can: a shield "
-            "may only reduce speed, or command velocities within the joints' limits. Distances "
-            "are not checked after it.",
+            f"A shield lets joint {joint} move at {over[joint]:.3g} times its velocity limit: a "
+            "shield may only reduce speed, or command velocities within the joints' limits. "
+            "Distances are not checked after it.",
             stacklevel=4,
         )

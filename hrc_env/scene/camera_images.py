@@ -66,8 +66,8 @@ class ImageConfig:
             check_integer(f"{name} of images [px]", getattr(self, name), SMALLEST_PX, LARGEST_PX)
         if self.cameras is not None and not self.cameras:
             raise ConfigError(
-                "cameras of images must name one or more cameras, or be None for all of the rig, "
-                "got none of them. An observation without images: observe_images=None."
+                "cameras of images must name one or more cameras, or be None for the whole rig, "
+                "got an empty list. For an observation without images, use observe_images=None."
             )
 
 

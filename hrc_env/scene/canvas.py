@@ -328,7 +328,7 @@ class Canvas:
     def _open(self) -> gl.Drawing:
         """Return the OpenGL context, which is made at the first call."""
         if self._closed:
-            raise RenderingError("This renderer has been closed: make a new one.")
+            raise RenderingError("This renderer has been closed: create a new one.")
         if self._drawing is None:
             self._drawing = gl.new_context(self.width_px, self.height_px, self._model)
             with self._drawing.current() as looks:

@@ -70,8 +70,8 @@ class AppearanceConfig:
         low, high = self.light
         if not 0.05 <= low <= high <= 3.0:
             raise ConfigError(
-                "light must be two factors from 0.05 to 3, the lesser one first, got "
-                f"{self.light}; (0.5, 1.3) is from half the light to a third more."
+                f"light must be two factors from 0.05 to 3 in ascending order, got {self.light}; "
+                "for example, (0.5, 1.3) is from 50 % to 130 % of the default intensity."
             )
         bounds = {"light_turn_deg": 180.0, "light_tilt_deg": 60.0, "litter": MOST_LITTER}
         shares = dict.fromkeys(("warmth", "untextured", "tint", "clothing", "skin", "hat"), 1)

@@ -63,7 +63,7 @@ class Drawing:
         """Make the context current on this thread; restore the previous one afterwards."""
         with self._lock:
             if self._freed:
-                raise RenderingError("This graphics context has been freed: make a new renderer.")
+                raise RenderingError("This graphics context has been freed: create a new renderer.")
             restore = _find_restore(type(self._gl))
             self._gl.make_current()
             try:
@@ -141,7 +141,7 @@ def require_display() -> None:
 
     if not glfw.init():
         raise RenderingError(
-            f"No window system answers (DISPLAY={os.environ.get('DISPLAY', '')!r}, "
+            f"No window system is available (DISPLAY={os.environ.get('DISPLAY', '')!r}, "
             f"WAYLAND_DISPLAY={os.environ.get('WAYLAND_DISPLAY', '')!r})"
         )
 
@@ -211,9 +211,9 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
             return made
     except Exception as error:
         raise RenderingError(
-            f"No OpenGL context could be made ({_settings(backend)}): "
-            f"{str(error).strip().rstrip('.')}. EGL, which needs no display, is taken where "
-            f"MUJOCO_GL is not set; on Debian or Ubuntu it comes with: {APT_LINE}"
+            f"No OpenGL context could be created ({_settings(backend)}): "
+            f"{str(error).strip().rstrip('.')}. EGL, which needs no display, is the default if "
+            f"MUJOCO_GL is not set; on Debian or Ubuntu, install it with: {APT_LINE}"
         ) from error
 
 
@@ -267,7 +267,7 @@ def _context_class(backend: str) -> Any:
     if backend not in LIBRARIES:
         raise make_unknown_name_error("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
     if not _has_library(LIBRARIES[backend]):
-        raise OSError(f"there is no library lib{LIBRARIES[backend]}")
+        raise OSError(f"the library lib{LIBRARIES[backend]} is missing")
     platform = os.environ.get("PYOPENGL_PLATFORM") or backend
     if platform.lower() != backend:
         raise OSError(f"PYOPENGL_PLATFORM={platform!r} must be {backend!r} or not set")

@@ -141,7 +141,7 @@ def find_objects(spec: mujoco.MjSpec, first: int) -> Objects:
         low = np.min([geom.pos - geom.size for geom in boxes], axis=0)
         high = np.max([geom.pos + geom.size for geom in boxes], axis=0)
         if np.abs(low + high).max() > 1e-6:
-            raise ConfigError(f"Object {body.name!r} must have its middle at its origin.")
+            raise ConfigError(f"Object {body.name!r} must have its center at its origin.")
         half[row] = high
         parts.append([shape(BOX, geom.pos, np.eye(3), geom.size) for geom in boxes])
         capsules.append([each for geom in boxes for each in fit_capsules(geom.pos, geom.size)])

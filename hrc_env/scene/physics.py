@@ -202,7 +202,7 @@ class Physics:
             poses: (n, O, 7) poses of loose objects; None for those of the task's MJCF.
         """
         ids = np.asarray(ids, int)
-        check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
+        check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one entry per joint")
         for sims in (self._sims, self._alone):
             sims.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         self._qpos[ids, : self._n] = q
@@ -349,7 +349,7 @@ class Physics:
             if np.count_nonzero(sims.warning):
                 environment, kind, _ = np.argwhere(sims.warning)[0]
                 raise HRCError(
-                    f"The physics of environment {environment} broke down "
+                    f"The physics of environment {environment} became unstable "
                     f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "
                     "contacts; reset it, and check its commands."
                 )

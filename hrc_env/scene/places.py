@@ -153,8 +153,8 @@ def _shape_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
     kind = KINDS.get(form)
     if kind is None or model.body_weldid[model.geom_bodyid[geom]] != 0:
         raise HRCError(
-            f"Geom {model.geom(geom).name!r} cannot block sight: expected one of "
-            f"{[each.name for each in KINDS]} that is fixed in the world."
+            f"Geom {model.geom(geom).name!r} cannot block lines of sight: expected one of "
+            f"{[each.name for each in KINDS]}, fixed in the world."
         )
     half_size = model.geom_size[geom].copy()
     if kind != BOX:

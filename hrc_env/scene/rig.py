@@ -48,14 +48,16 @@ def select(
     indices = [_index(choice, names) for choice in (range(len(names)) if use is None else use)]
     if not indices:
         raise ConfigError(
-            f"A rig needs at least one camera, got none. Valid names: {', '.join(names)}. "
-            'To see nothing at all: perception="none".'
+            f"A rig needs at least one camera, got none. Valid names: {', '.join(names)}. Without "
+            'any perception, use perception="none".'
         )
     if len(indices) > MOST_CAMERAS:
         raise ConfigError(f"A rig has 1 to {MOST_CAMERAS} cameras, got {len(indices)}.")
     for index in indices:
         if indices.count(index) > 1:
-            raise ConfigError(f"Camera {names[index]!r} is chosen more than once: name it once.")
+            raise ConfigError(
+                f"Camera {names[index]!r} is chosen more than once: name it only once."
+            )
     return tuple(cameras[index] for index in indices)
 
 

@@ -106,8 +106,8 @@ class RigDistribution:
         low, high = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
         if high > n_cameras:
             raise ConfigError(
-                f"RigDistribution.n_cameras={self.n_cameras}: the rig that it is around has "
-                f"{n_cameras} cameras. Name no more, or give `nominal` more of them."
+                f"RigDistribution.n_cameras={self.n_cameras}: the nominal rig has {n_cameras} "
+                "cameras. Choose at most as many, or a `nominal` rig with more."
             )
         return CameraCounts(low, high)
 
@@ -162,9 +162,9 @@ def _draw_camera(
             return drawn
         refused = poor[0]
     raise ConfigError(
-        f"{distribution}: no place was found for camera {camera.name!r} in {TRIES} draws from "
-        f"which it sees the workspace. The last one: {refused} Let it "
-        "differ less, or hang it elsewhere."
+        f"{distribution}: in {TRIES} draws, no pose was found from which camera {camera.name!r} "
+        f"sees the workspace. The last draw: {refused} Reduce the deviations, or change the "
+        "nominal pose."
     )
 
 

@@ -141,7 +141,7 @@ def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = N
     if fewest == 1 and len(scene.cameras) > 1 and wants_pairs:
         return [
             *describe_defects(scene),
-            f"Rigs of one camera are drawn. {_describe_one_camera(wants_pairs)}",
+            f"Some drawn rigs have only one camera. {_describe_one_camera(wants_pairs)}",
         ]
     if scene.config.cameras == RIGS.get(scene.name) and len(scene.cameras) > 1:
         return []
@@ -149,8 +149,9 @@ def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = N
     if len(scene.cameras) == 1:
         share = _visible_shares(scene)[0]
         defects.append(
-            f"There is one camera, {scene.cameras[0].name!r}, which sees {100 * share:.0f} % of "
-            f"the workspace; what it does not see is unknown. {_describe_one_camera(wants_pairs)}"
+            f"The rig has a single camera, {scene.cameras[0].name!r}, which sees {100 * share:.0f} "
+            "% of the workspace; what it does not see is unknown. "
+            f"{_describe_one_camera(wants_pairs)}"
         )
     return defects
 
@@ -158,11 +159,11 @@ def describe_defects(scene: Scene, wants_pairs: str = "", fewest: int | None = N
 def _describe_one_camera(wants_pairs: str) -> str:
     """Return a description of an estimator's behaviour with only one camera, in one sentence."""
     if not wants_pairs:
-        return "How far people are follows from their bodies' usual size."
+        return "Distances of people are inferred from the usual size of bodies."
     return (
-        f"The estimator {wants_pairs!r} needs two that see a person at once (needs_pairs), and "
-        "finds nobody: add a camera, or use estimator='particle', which takes the distance from "
-        "the body's usual size."
+        f"The estimator {wants_pairs!r} needs two cameras that see a person at the same time "
+        "(needs_pairs), and will detect no people: add a camera, or use estimator='particle', "
+        "which infers distances from the usual size of bodies."
     )
 
 
@@ -177,10 +178,14 @@ def describe_poor_cameras(scene: Scene) -> list[str]:
         ceiling_m = SCENES[scene.name].ceiling_m
         above = ceiling_m is not None and camera.eye_world[2] > ceiling_m
         if inside or above or share < POOR_SHARE:
-            place = "hangs in or behind a wall or an obstacle" if inside else "looks elsewhere"
+            place = (
+                "is inside or behind a wall or an obstacle"
+                if inside
+                else "looks in another direction"
+            )
             sentences.append(
                 f"Camera {camera.name!r} sees {100 * share:.0f} % of the workspace: it "
-                f"{'hangs above the ceiling' if above else place}."
+                f"{'is above the ceiling' if above else place}."
             )
     return sentences
 

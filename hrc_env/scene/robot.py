@@ -130,15 +130,15 @@ class Robot:
         check_kind(f"{self.name}: hand", self.hand, Hand, None)
         check_kind(f"{self.name}: suction", self.suction, Suction, None)
         if self.hand and self.suction:
-            raise ConfigError(f"{self.name} has a hand and suction: give one of them.")
+            raise ConfigError(f"{self.name} has a hand and suction: choose one of them.")
         for name in ("home_q", "spread_rad", "slew"):
             values = getattr(self, name)
             if name == "slew" and not values:
                 continue
             if len(values) != len(self.joints) or not np.isfinite(values).all():
                 raise ConfigError(
-                    f"{self.name}: {name} must be {len(self.joints)} angles [rad], of slides "
-                    f"ways [m], got {values}."
+                    f"{self.name}: {name} must be {len(self.joints)} angles [rad] or, for "
+                    f"prismatic joints, positions [m], got {values}."
                 )
 
 
@@ -242,7 +242,7 @@ def check_robot(robot: Robot) -> None:
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     if not isinstance(robot.name, str) or not robot.name.strip():
         raise ConfigError(
-            f"A robot must have a name, by which robot= knows it, got {robot.name!r}."
+            f"A robot must have a name, by which robot= selects it, got {robot.name!r}."
         )
     if not (robot.joints and robot.capsules):
         raise ConfigError(f"{robot.name}: joints and capsules must name at least one each.")
@@ -253,7 +253,7 @@ def check_robot(robot: Robot) -> None:
     low, high = chain.range_rad.T
     if ((robot.home_q < low) | (robot.home_q > high)).any():
         raise ConfigError(
-            f"{robot.name}: home_q {robot.home_q} is outside of the joints' ranges, from "
+            f"{robot.name}: home_q {robot.home_q} is outside the joints' ranges, from "
             f"{low.tolist()} to {high.tolist()}."
         )
     spread, widest = np.array(robot.spread_rad), high - low

@@ -118,8 +118,8 @@ def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None")
     has_fingers = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
     if joints + fingers != list(range(model.njnt)) or not (has_joints and has_fingers):
         raise ConfigError(
-            "joints must be all of its MJCF, in its order: hinges and slides with a range; then "
-            "its hand's: slides with a range."
+            "joints must be all joints of its MJCF, in the same order: hinges and slides with a "
+            "range, then those of its hand: slides with a range."
         )
     motors = [find_id(model, "actuator", hand.motor)] if hand else []
     integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
@@ -131,7 +131,8 @@ def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None")
     ):
         raise ConfigError(
             "needs an <intvelocity> for every joint in order, then a <velocity> for every joint, "
-            "each with a ctrlrange [rad/s, of slides m/s]; then its hand's <position> with one [m]."
+            "each with a ctrlrange [rad/s, for slides m/s]; then the <position> of its hand with a "
+            "ctrlrange [m]."
         )
 
 
@@ -177,7 +178,7 @@ def _read_capsules(
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
             raise ConfigError(f"geom {name!r} must be a capsule.")
         if link < 0:
-            raise ConfigError(f"geom {name!r} is on no link.")
+            raise ConfigError(f"geom {name!r} is not part of a link.")
         T = np.linalg.inv(links[link]) @ _pose(data.geom_xpos[geom], data.geom_xmat[geom])
         along = T[:3, 2] * model.geom_size[geom, 1]
         ends[k] = T[:3, 3] - along, T[:3, 3] + along

@@ -116,7 +116,7 @@ def _read(mjcf: str | Path) -> mujoco.MjSpec:
         return mujoco.MjSpec.from_file(str(mjcf))
     except ValueError as error:
         source = "This text" if is_text else f"The file {mjcf}"
-        raise ConfigError(f"{source} must be an MJCF that MuJoCo reads: {error}") from error
+        raise ConfigError(f"{source} must be an MJCF that MuJoCo can load: {error}") from error
 
 
 def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
@@ -139,8 +139,8 @@ def _find_chain(model: mujoco.MjModel, name: str) -> Chain:
     kinds = {int(kind) for kind in model.jnt_type}
     if not model.njnt or not kinds <= {HINGE, SLIDE}:
         raise ConfigError(
-            f"{name}: an arm has hinges and slides only, with its foot fixed; this MJCF has "
-            f"{_describe_joints(model)}. Take free joints out, and a gripper or a second arm."
+            f"{name}: an arm must have only hinges and slides and a fixed base; this MJCF has "
+            f"{_describe_joints(model)}. Remove free joints, grippers and further arms."
         )
     bodies = model.jnt_bodyid.tolist()
     for before, body in pairwise(bodies):
@@ -149,9 +149,9 @@ def _find_chain(model: mujoco.MjModel, name: str) -> Chain:
             up = int(model.body_parentid[up])
         if up != before or body == before:
             raise ConfigError(
-                f"{name}: the joints must be a single chain with one joint a body; "
+                f"{name}: the joints must be a single chain with one joint per body; "
                 f"{model.joint(bodies.index(body)).name!r} does not follow the joint before it. "
-                "Take a gripper or a second arm out of the MJCF."
+                "Remove grippers and further arms from the MJCF."
             )
     names = [model.joint(k).name for k in range(model.njnt)]
     links = [model.body(body).name for body in bodies]
@@ -164,7 +164,7 @@ def _one_a_joint(name: str, value: Sequence[float] | float, n: int) -> tuple[flo
     """Return an argument as one value per joint, or raise `ConfigError` for a wrong number."""
     values = (float(value),) * n if isinstance(value, int | float) else tuple(value)
     if len(values) != n:
-        raise ConfigError(f"{name} must be one number, or one of each of {n} joints, got {value}.")
+        raise ConfigError(f"{name} must be one number, or one for each of {n} joints, got {value}.")
     return values
 
 

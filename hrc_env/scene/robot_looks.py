@@ -101,16 +101,16 @@ def warn_of_mismatch(robot: "Robot") -> None:
     for name, mismatch in compare_looks(robot).items():
         if name not in drawn and mismatch.bare_m > UNLIKE_M:
             warnings.warn(
-                f"{robot.name}: capsule {name!r} reaches {100 * mismatch.bare_m:.0f} cm out of "
-                "the robot's visual geoms: cameras do not see the surface of which distances are "
+                f"{robot.name}: capsule {name!r} reaches {100 * mismatch.bare_m:.0f} cm beyond the "
+                "robot's visual geoms: cameras do not see the surface from which distances are "
                 "measured. Add a visual geom, or shorten the capsule.",
                 stacklevel=4,
             )
         if mismatch.outside_m > UNLIKE_M:
             warnings.warn(
                 f"{robot.name}: visual geoms on the link of capsule {name!r} reach "
-                f"{100 * mismatch.outside_m:.0f} cm out of all capsules: people may touch a part "
-                "that shields do not know. Add a capsule to that link.",
+                f"{100 * mismatch.outside_m:.0f} cm beyond all capsules: people may touch a part "
+                "that shields do not consider. Add a capsule to that link.",
                 stacklevel=4,
             )
 

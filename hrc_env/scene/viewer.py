@@ -39,8 +39,8 @@ class Viewer:
             self._window: Any = viewer.launch_passive(self._model, self._data)
         except Exception as error:
             raise RenderingError(
-                f"MuJoCo's viewer could not be opened: {error}. It needs a display; without "
-                "one, film the episode instead: python -m hrc_env play --video out/play.mp4"
+                f"MuJoCo's viewer could not be opened: {error}. It needs a display; without one, "
+                "record a video instead: python -m hrc_env play --video out/play.mp4"
             ) from error
 
     def show(self, q: JointAngles, motion: WorkerMotion) -> None:

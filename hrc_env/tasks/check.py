@@ -103,14 +103,14 @@ def _check_goal(who: str, goal: Goal, config: Any) -> None:
                 f"{name} must take {signature}; got {of_all.shape} of (2, 3, {size})."
             )
         if not np.allclose(part, of_all[at], equal_nan=True):
-            raise ConfigError(f"{name} must judge each pair for itself, whatever stands beside it.")
+            raise ConfigError(f"{name} must evaluate each pair independently of the others.")
 
 
 def _describe(task: object) -> str:
     """Return a description of an object that is not a task class, for an error message."""
     if isinstance(task, Task):
         name = cast(object, task).__class__.__name__
-        return f"an object of it: register the class {name} itself"
+        return f"an instance: register the class {name} itself"
     return task.__name__ if isinstance(task, type) else task.__class__.__name__
 
 
@@ -127,8 +127,8 @@ def _check_names(task: TaskType) -> None:
         similar = get_close_matches(name, set(HOOKS) - set(names), 1, 0.85) if is_new else []
         if similar:
             raise ConfigError(
-                f"{task.id}: {name} is never called. Is {similar[0]} meant? A method that is your "
-                f"own needs a name that is farther from it."
+                f"{task.id}: {name} is never called. Did you mean {similar[0]}? A custom method "
+                "needs a less similar name."
             )
 
 
@@ -175,7 +175,7 @@ def _check_terms(task: AnyTask) -> None:
     for all_terms in (task.observation_terms, task.reward_terms):
         name, times = Counter(term.name for term in all_terms).most_common(1)[0]
         if times > 1:
-            raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+            raise ConfigError(f"{task.id}: the term {name!r} exists already; choose another name.")
 
 
 def _check_state(task: AnyTask) -> None:
@@ -192,7 +192,7 @@ def _check_state(task: AnyTask) -> None:
         )
     for name, part in parts.items():
         shape = np.shape(cast(ArrayLike, part))
-        check_shape(f"{task.id}: {name}", shape[:1], (2,), "a row an environment")
+        check_shape(f"{task.id}: {name}", shape[:1], (2,), "one row per environment")
     info = task.info(state)
     check_kind(f"{task.id}: info", info, Mapping)
     _check_info(task, info, 2)
@@ -209,16 +209,18 @@ def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
             )
     if task.achieved == task.failed:
         raise ConfigError(
-            f"{task.id}: achieved and failed must be two counts, of which success is the share; "
-            f"both are {task.achieved!r}."
+            f"{task.id}: achieved and failed must be two different counts, from which the success "
+            f"rate is computed; both are {task.achieved!r}."
         )
     for name in (task.achieved, task.failed, "is_success"):
         if name not in info:
-            raise ConfigError(f"{task.id}: info must hold {name!r}, has {', '.join(info)}.")
+            raise ConfigError(f"{task.id}: info must hold {name!r}, got {', '.join(info)}.")
     for name, value in info.items():
         if name != "is_success" and not name.startswith("task/"):
             raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
-        check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one an environment")
+        check_shape(
+            f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one entry per environment"
+        )
 
 
 def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
@@ -238,6 +240,6 @@ def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
     success = np.asarray(info["is_success"], float)
     if not np.isin(success, (0.0, 1.0)).all():
         raise ConfigError(
-            f"{task.id}: info['is_success'] must be 0 or 1, whether the episode would be a success "
-            f"if it ended now, got {success}."
+            f"{task.id}: info['is_success'] must be 0 or 1: whether the episode would be a success "
+            f"if it ended now; got {success}."
         )

@@ -212,7 +212,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             frame="world",
             bound=20.0,
             scale=5.0,
-            doc="From the middle of the base to that of its zone, x and y.",
+            doc="Center of the zone, relative to that of the base, in x and y.",
             function=lambda belief: belief.task.goal_world - belief.robot.q[:, :2],
         ),
         ObservationTerm(
@@ -222,7 +222,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             frame="-",
             bound=30.0,
             scale=5.0,
-            doc="Length of the way to the zone round the obstacles, by the map.",
+            doc="Length of the path to the zone around the obstacles of the map.",
             function=lambda belief: belief.task.way_m,
         ),
         ObservationTerm(
@@ -232,7 +232,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             frame="world",
             bound=1.0,
             scale=1.0,
-            doc="Unit vector along that way from the base, x and y.",
+            doc="Unit vector along this path at the base, in x and y.",
             function=lambda belief: belief.task.way_direction,
         ),
         ObservationTerm(
@@ -242,16 +242,17 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             frame="world",
             bound=RANGE_M,
             scale=2.0,
-            doc="From the middle of the base to the obstacles of the map, at 24 angles from the x "
-            "axis to the left, 15 degrees apart; people are not on the map.",
+            doc="Distances from the center of the base to the obstacles of the map in 24 "
+            "directions, 15 degrees apart, counterclockwise from the x axis; people are not on the "
+            "map.",
             function=lambda belief: belief.task.ranges_m,
         ),
     )
     rewards = (
-        progress("Metres by which the remaining way became shorter"),
+        progress("Decrease of the remaining path [m]"),
         RewardTerm(
             name="delivered",
-            doc="`task.delivered_bonus` for the step in which the base stands in its zone.",
+            doc="`task.delivered_bonus` in the step in which the base comes to rest in its zone.",
             function=lambda belief, step, previous, config: (
                 config.delivered_bonus * step["delivered"]
             ),
@@ -305,9 +306,9 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         if not _has_valid_length(site, self.config).any():
             (low, high), longest = self.config.way_m, lengths.max(initial=0.0)
             raise ConfigError(
-                f"HRCDelivery-v0 needs a place with two zones that a way of {low:g} to {high:g} m "
-                f"joins; here are {len(zones)} zones, and the longest way is {longest:.1f} m. "
-                'Valid is scene="site", or other task.way_m.'
+                f"HRCDelivery-v0 needs a scene with two zones that are joined by a path of {low:g} "
+                f"to {high:g} m; this scene has {len(zones)} zones, and its longest path is "
+                f'{longest:.1f} m. Valid is scene="site", or other task.way_m.'
             )
         return site
 

@@ -198,7 +198,7 @@ def _advance_screws(state: Records1[DrywallState], world: World, dt_s: float) ->
     pressed against the studs.
     """
     n, driven = len(SCREWS_M), state["driven"]
-    workers = require(world.workers, "What workers do")
+    workers = require(world.workers, "The state of the workers")
     is_alone = ~workers.present.any(axis=1)
     by_workers = np.maximum(driven, workers.screws.max(axis=1, initial=0))
     since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - DRIVING_S * driven
@@ -223,7 +223,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
             frame="world",
             bound=3.0,
             scale=0.5,
-            doc="From the board's middle, as measured, to its target.",
+            doc="Target of the board's center, relative to its measured position.",
             function=lambda belief: (
                 belief.task.place_world - require(belief.objects, "A board").position_world[:, 0]
             ),
@@ -235,23 +235,23 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
             frame="-",
             bound=4.0,
             scale=2.0,
-            doc="Number of screws that are driven; with 4 the board is fixed.",
+            doc="Number of driven screws; 4 screws fix the board.",
             function=lambda belief: belief.task.driven.astype(float),
         ),
     )
     rewards = (
         progress(
-            "Metres that the board came nearer to its target, 0.3 m for a radian, and the tool to "
-            "the board until it is held"
+            "Decrease of the distances from the board to its target, where a radian counts as 0.3 "
+            "m, and, until the board is held, from the tool to the board [m]"
         ),
         RewardTerm(
             name="screws",
-            doc="`task.screw_bonus` for each screw that is driven.",
+            doc="`task.screw_bonus` for each screw that is driven in this step.",
             function=lambda belief, step, previous, config: config.screw_bonus * step["driven"],
         ),
         RewardTerm(
             name="done",
-            doc="`task.done_bonus` in the step in which the fixed board is let go.",
+            doc="`task.done_bonus` in the step in which the fixed board is released.",
             function=lambda belief, step, previous, config: np.multiply(
                 config.done_bonus, step["done"]
             ),
@@ -261,12 +261,13 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     failed = "task/screws_remaining"
     starts = (
         "The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by up "
-        "to 0.06 rad. The worker waits out of reach until it is pressed against the studs; without "
-        "a worker screws are driven by themselves."
+        "to 0.06 rad. The worker waits out of reach until it is pressed against the studs. Without "
+        "a worker, the simulation drives the screws automatically."
     )
     ends = (
-        "When four screws hold the board and the cups have let go. A success: while screws were "
-        "driven it was never off its place by 5 mm or half a degree."
+        "Terminates when four screws hold the board and the suction cups have released it. The "
+        "episode is a success if the board's deviation from its target pose stayed below 5 mm and "
+        "0.5 degrees while screws were driven."
     )
     max_episode_steps = BUILT_IN[id].max_episode_steps
     robot = "ur10e_cups"
@@ -295,7 +296,11 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     def reach_targets(self) -> list[ReachTarget]:
         """Return the position of the suction cups when the board is in position."""
         front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
-        return [ReachTarget("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
+        return [
+            ReachTarget(
+                "the target position of the board", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0)
+            )
+        ]
 
     def reset(self, state: Records1[DrywallState], ids: Ints, rngs: Rngs, world: World) -> None:
         """Sample the initial board pose and the screw forces of environments `ids`."""

@@ -213,5 +213,5 @@ def _read_info(info: Infos, name: str, shape: tuple[int, ...]) -> Floats:
     else:
         values = np.array([each.get(name, 0.0) for each in info], float)
     if values.shape not in ((), shape):
-        check_shape(f"info[{name!r}]", values.shape, shape, "a value a pair of goals")
+        check_shape(f"info[{name!r}]", values.shape, shape, "one value per pair of goals")
     return values

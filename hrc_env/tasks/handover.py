@@ -274,7 +274,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
             frame="world",
             bound=3.0,
             scale=0.5,
-            doc="From the tool point to the place near which a hand is put out.",
+            doc="Point near which the worker holds out a hand, relative to the tool point.",
             function=lambda belief: belief.task.meet_world - belief.robot.tool_world,
         ),
         ObservationTerm(
@@ -284,14 +284,14 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
             frame="-",
             bound=1.0,
             scale=1.0,
-            doc="1 when the worker has the tool.",
+            doc="1 if the worker has the tool, else 0.",
             function=lambda belief: belief.task.taken.astype(float),
         ),
     )
     rewards = (
         progress(
-            "Metres that the fingers came nearer to the tool, and its handle to the place near "
-            "which a hand is put out"
+            "Decrease of the distances from the fingers to the tool, and from its handle to the "
+            "point near which the worker holds out a hand [m]"
         ),
         RewardTerm(
             name="taken",
@@ -302,7 +302,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         ),
         RewardTerm(
             name="done",
-            doc="`task.done_bonus` in the step in which it is handed over.",
+            doc="`task.done_bonus` in the step in which the handover is complete.",
             function=lambda belief, step, previous, config: np.multiply(
                 config.done_bonus, step["done"]
             ),
@@ -311,12 +311,12 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     achieved = "task/handed_over"
     failed = "task/not_handed_over"
     starts = (
-        "The arm is near home, the fingers open. The tool stands upright in its stand. The worker"
-        " waits out of reach, and comes when the robot has lifted it."
+        "The arm is near home, the fingers open. The tool stands upright in its stand. The worker "
+        "waits out of reach and approaches when the robot has lifted the tool."
     )
     ends = (
-        "When the worker has the tool, and the robot has let go and left it: that is the success,"
-        " if the hand never felt more than `task.gentle_n`."
+        "Terminates when the worker has the tool and the robot has released it and moved away. The "
+        "episode is a success if the force on the hand never exceeded `task.gentle_n`."
     )
     max_episode_steps = BUILT_IN[id].max_episode_steps
     robot = "ur10e_gripper"
@@ -338,7 +338,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
 
     def reach_targets(self) -> list[ReachTarget]:
         """Return the position at which the robot meets the worker."""
-        return [ReachTarget("the place to meet", FOOT_WORLD + MEET_M)]
+        return [ReachTarget("the handover position", FOOT_WORLD + MEET_M)]
 
     def reset(self, state: Records1[HandoverState], ids: Ints, rngs: Rngs, world: World) -> None:
         """Sample the initial pose of the tool in its stand, for environments `ids`."""
@@ -362,7 +362,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     ) -> Records1[HandoverStep]:
         """Update tool and hand, let the hand grasp, and return the results (B,) of the step."""
         tool, step = require(world.objects, "A tool"), make_records(HandoverStep, len(state))
-        workers = require(world.workers, "What workers do")
+        workers = require(world.workers, "The state of the workers")
         held, middle, handle = tool.held[:, 0], tool.position_world[:, 0], _find_handle(tool)
         state["handle_world"] = handle.position_world
         state["lifted"] = held & (middle[:, 2] > STAND_UP_M + LIFTED_M)

@@ -98,20 +98,20 @@ def _check_contacts(name: str, contacts: object, sizes: Sizes) -> None:
 
 def _check_loads(name: str, loads: object, sizes: Sizes) -> None:
     if not isinstance(loads, bool | np.bool_):
-        flags_of(name, loads, (sizes.batch, sizes.objects), "B, O, or True or False for all")
+        flags_of(name, loads, (sizes.batch, sizes.objects), "B, O; or True or False for all")
 
 
 def _check_end(name: str, over: object, sizes: Sizes) -> None:
     if not isinstance(over, bool | np.bool_):
-        flags_of(name, over, (sizes.batch,), "one an environment, or True or False for all")
+        flags_of(name, over, (sizes.batch,), "one entry per environment, or True or False for all")
 
 
 def _check_points(name: str, points: object, sizes: Sizes) -> None:
     shape = _shape_of(points)
     if len(shape) != 3:
         raise ConfigError(
-            f"{name} must be points (B, M, 3) [m, world], got {describe(points)}; none are "
-            "numpy.zeros((B, 0, 3))."
+            f"{name} must be points (B, M, 3) [m, world], got {describe(points)}; for no points, "
+            "return numpy.zeros((B, 0, 3))."
         )
     check_shape(name, shape[2:], (3,), "xyz")
 
@@ -123,7 +123,7 @@ def _shape_of(value: object) -> tuple[int, ...]:
 
 def _check_angles(name: str, angles: Any, sizes: Sizes) -> None:
     if np.ndim(angles) == 2:  # the shape is checked when they are used
-        numbers_of(name, angles, np.shape(angles), "an angle a joint")
+        numbers_of(name, angles, np.shape(angles), "one angle per joint")
 
 
 def _check_info(name: str, info: object, sizes: Sizes) -> None:

@@ -152,7 +152,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
             frame="world",
             bound=3.0,
             scale=0.5,
-            doc="From each piece, as measured, to its place.",
+            doc="Target position of each piece, relative to its measured position.",
             function=lambda belief: (
                 belief.task.places_world - require(belief.objects, "An object").position_world
             ),
@@ -164,19 +164,19 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
             frame="-",
             bound=1.0,
             scale=1.0,
-            doc="1 for a piece that rests in its place, let go.",
+            doc="1 if the piece rests at its target position and is released, else 0.",
             function=lambda belief: belief.task.placed.astype(float),
         ),
     )
     rewards = (
         progress(
-            "Metres that pieces came nearer to their places, and the tool to the first that is "
-            "not placed"
+            "Decrease of the distances from the pieces to their target positions, and from the "
+            "tool to the first piece that is not placed [m]"
         ),
         RewardTerm(
             name="placed",
-            doc="`task.placed_bonus` for each piece that is placed in this step, less those that "
-            "left their places.",
+            doc="`task.placed_bonus` for each piece that is placed in this step, minus the same "
+            "for each that left its target position.",
             function=lambda belief, step, previous, config: config.placed_bonus * step["placed"],
         ),
     )
@@ -184,10 +184,13 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
     failed = "task/studs_remaining"
     starts = (
         "The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
-        "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, of which the"
-        " worker takes one after the other away."
+        "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, which the "
+        "worker takes away one after the other."
     )
-    ends = "When all three pieces rest in their places, let go: that is the success."
+    ends = (
+        "Terminates when all three pieces rest at their target positions and are released, "
+        "which is the success."
+    )
     max_episode_steps = BUILT_IN[id].max_episode_steps
     robot = "ur10e_gripper"
     needs_gripper = True
@@ -209,7 +212,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         """Return the target positions of the pieces, which are gripped from above."""
         down = (0.0, 0.0, -1.0)
         return [
-            ReachTarget(f"the place of piece {k + 1}", place, down)
+            ReachTarget(f"the target position of piece {k + 1}", place, down)
             for k, place in enumerate(PLACES_WORLD)
         ]
 

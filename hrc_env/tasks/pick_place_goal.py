@@ -69,7 +69,10 @@ class PickPlaceGoal(PickPlace):
     config_type = PickPlaceGoalConfig
     observations = ()
     rewards = ()
-    ends = "Not before the time is up. A success: all pieces rest in their places now."
+    ends = (
+        "Never terminates. The episode is a success if all pieces rest at their target "
+        "positions at its end."
+    )
     max_episode_steps = BUILT_IN[id].max_episode_steps
     goal = Goal(
         size=3 * STUDS,
@@ -77,8 +80,8 @@ class PickPlaceGoal(PickPlace):
         achieved=_measured_places,
         desired=_target_places,
         reward=reward_placing,
-        doc="Minus the share of pieces that are not within `task.goal_m` of their places, as "
-        'measured; -1 or 0 with `task.reward` "all". For a success they must also be let go and '
-        "at rest.",
+        doc="Minus the share of pieces whose measured distance from their target positions exceeds "
+        '`task.goal_m`; with `task.reward` "all", -1 unless all are within it. For a success, they '
+        "must also be released and at rest.",
     )
     is_terminal = AnyTask.is_terminal

@@ -134,7 +134,7 @@ def _judge_goals(
     return any_done
 
 
-MIDDLE = "the middle of its goals"
+MIDDLE = "the center of its goals"
 """Name of the second target that `list_targets` returns."""
 
 
@@ -184,8 +184,8 @@ def make_target(goal: Floats, config: TargetConfig) -> ReachTarget:
     place = np.asarray(goal, float)
     if place.shape != (3,) or not np.isfinite(place).all() or place[2] < 0.0:
         raise ConfigError(
-            "The goal of a reset must be a place (x, y, z) above the floor [m, world], "
-            f"got {goal!r}."
+            "The goal of a reset must be a point (x, y, z) above the floor [m, world], got "
+            f"{goal!r}."
         )
     return ReachTarget("the goal", place, within_m=config.radius_m)
 
@@ -215,7 +215,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
             frame="world",
             bound=3.0,
             scale=0.5,
-            doc="From the tool point to the goal.",
+            doc="Position of the goal, relative to the tool point.",
             function=lambda belief: belief.task.goal_world - belief.robot.tool_world,
         ),
         ObservationTerm(
@@ -225,7 +225,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
             frame="world",
             bound=1.0,
             scale=1.0,
-            doc="The same, divided by its length plus 5 cm.",
+            doc="The same vector, divided by its length plus 5 cm.",
             function=lambda belief: directions(
                 belief.task.goal_world - belief.robot.tool_world, 0.05
             ),
@@ -237,14 +237,15 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
             frame="-",
             bound=10.0,
             scale=4.0,
-            doc="Time until the goal is missed.",
+            doc="Time until the goal's time limit expires.",
             function=lambda belief: belief.task.time_left_s,
         ),
     )
     rewards = (
         RewardTerm(
             name="progress",
-            doc="Metres that the tool came nearer to its goal, times `task.progress_per_m`.",
+            doc="Decrease of the distance from the tool to its goal [m], times "
+            "`task.progress_per_m`.",
             function=lambda belief, step, previous, config: (
                 config.progress_per_m * step["progress_m"]
             ),
@@ -260,10 +261,13 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
     achieved = "task/goals_reached"
     failed = "task/goals_missed"
     starts = (
-        "The arm is near home, turned anywhere in front of its base. A first goal appears; the "
-        "next one when it is reached, or missed after `task.time_limit_s`."
+        "The arm is near home, turned anywhere in front of its base. The first goal appears; when "
+        "it is reached, or missed after `task.time_limit_s`, the next one appears."
     )
-    ends = "Not before the time is up. A success: every goal so far, and at least one, was reached."
+    ends = (
+        "Never terminates. The episode is a success if at least one goal was reached and none "
+        "was missed."
+    )
 
     def make_state(self, batch: int) -> Records1[ReachState]:
         """Return the state of `batch` environments, to be filled by `reset`."""

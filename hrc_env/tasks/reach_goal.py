@@ -54,7 +54,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         "The arm is near home, turned anywhere in front of its base. One goal, for the whole "
         "episode."
     )
-    ends = "Not before the time is up. A success: the tool is at its goal now."
+    ends = "Never terminates. The episode is a success if the tool is at its goal at the end."
     max_episode_steps = BUILT_IN[id].max_episode_steps
     goal = Goal(
         size=3,
@@ -62,7 +62,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         achieved=lambda belief: belief.robot.tool_world,
         desired=lambda belief: belief.task.goal_world,
         reward=reward_reaching,
-        doc="0 while the tool point is within `task.radius_m` of its goal, else -1.",
+        doc="0 if the tool point is within `task.radius_m` of its goal, else -1.",
     )
 
     def make_state(self, batch: int) -> Records1[ReachGoalState]:

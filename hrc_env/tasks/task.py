@@ -95,8 +95,8 @@ class Task(Generic[ConfigT, StateT]):
         """
         if cls is Task:
             raise ConfigError(
-                "Task is a base class. Write class MyTask(hrc_env.Task) with the attributes and "
-                "methods that its documentation names, and register the class "
+                "Task is a base class. Define a subclass, class MyTask(hrc_env.Task), with the "
+                "attributes and methods in its documentation, and register it "
                 "(docs/bring_your_own/task.md)."
             )
         return super().__new__(cls)
@@ -209,8 +209,9 @@ class Task(Generic[ConfigT, StateT]):
         ids = dict.fromkeys((*BUILT_IN, *TASKS))
         known = [task for task in ids if takes_goals(find_task(task))]
         raise ConfigError(
-            f"{self.id} takes no goal of a reset: leave options['goal'] out. {', '.join(known)} "
-            "do; a task of yours does if it defines goal_targets and set_goal (hrc_env.Task)."
+            f"{self.id} does not support the goal of a reset: leave out options['goal']. "
+            f"{', '.join(known)} support it; a custom task does if it defines goal_targets and "
+            "set_goal (hrc_env.Task)."
         )
 
     def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
@@ -362,13 +363,13 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
     """
     base = find_task(task)
     if not terms:
-        raise ConfigError(f"Give at least one RewardTerm to add to {base.id}, got none.")
+        raise ConfigError(f"Pass at least one RewardTerm to add to {base.id}, got none.")
     names = [term.name for term in base().reward_terms]
     for term in terms:
-        check_kind("A reward's term", term, RewardTerm)
+        check_kind("A reward term", term, RewardTerm)
         if term.name in names:
             raise ConfigError(
-                f"{base.id} has a term {term.name!r} already; choose another name than "
+                f"{base.id} already has a term {term.name!r}; choose a name other than "
                 f"{', '.join(map(repr, names))}."
             )
         names.append(term.name)
@@ -409,8 +410,8 @@ def require_goal(task: AnyTask) -> Goal:
     if task.goal is None:
         known = [each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if find_task(each).goal]
         raise NoGoalError(
-            f"{task.id} has no goals apart from its observation, so that nothing can be judged by "
-            f"another goal (compute_reward, HER). {', '.join(known)} have: choose one of these, or "
-            "a learner without HER."
+            f"{task.id} has no goals separate from its observation, so that rewards cannot be "
+            f"computed for other goals (compute_reward, HER). Choose {', '.join(known)}, which "
+            "have such goals, or a learner without HER."
         )
     return task.goal

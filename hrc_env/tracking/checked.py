@@ -68,8 +68,8 @@ class CheckedEstimator(Generic[State]):
         state = self.inner.init(batch, n_workers)
         if _find_batch(state) not in (None, batch):
             raise ConfigError(
-                f"{self.name}: arrays of a state must begin with (B, W) = ({batch}, {n_workers}), "
-                f"got {describe(state)}."
+                f"{self.name}: arrays of a state must have leading axes (B, W) = ({batch}, "
+                f"{n_workers}), got {describe(state)}."
             )
         return state
 
@@ -108,7 +108,7 @@ class CheckedEstimator(Generic[State]):
         """
         if not isinstance(given, PoseEstimate):
             raise ConfigError(
-                f"{self.name}: {method} must give a PoseEstimate, got {describe(given)}."
+                f"{self.name}: {method} must return a PoseEstimate, got {describe(given)}."
             )
         n = len(given.mean_world) if batch is None else batch
         slots = (n, self.n_workers)

@@ -227,8 +227,8 @@ class ParticleConfig(TrackerConfig):
         least, most = self.noise_bounds
         if not 0 < least <= most < float("inf"):
             raise ConfigError(
-                "noise_bounds must be positive, finite and ordered, as (1.0, 6.0), "
-                f"got {self.noise_bounds}."
+                "noise_bounds must be positive, finite and ordered, such as (1.0, 6.0), got "
+                f"{self.noise_bounds}."
             )
         check_names("part in mirrored_parts", self.mirrored_parts, ("body", "limbs"))
 
@@ -268,16 +268,16 @@ class PaperConfig(TrackerConfig):
         check_fields(self, "not be negative", "sigma_m")
         if self.n_particles < 10:
             raise ConfigError(
-                f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
-                "fewer have no covariance."
+                f"n_particles must be at least 10, got {self.n_particles}: fewer have no "
+                "covariance after resampling."
             )
         place = np.array(self.initial_bounds_m)
         if self.initial_bounds_m and not (
             place.shape == (3, 2) and np.isfinite(place).all() and (np.diff(place) > 0).all()
         ):
             raise ConfigError(
-                "initial_bounds_m must be empty or hold the least and the most x, y and z, as "
-                f"((-3, 3), (-3, 3), (0, 2.2)), got {self.initial_bounds_m}."
+                "initial_bounds_m must be empty or contain the minimum and maximum of x, y and z, "
+                f"such as ((-3, 3), (-3, 3), (0, 2.2)), got {self.initial_bounds_m}."
             )
 
 

@@ -138,7 +138,7 @@ def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
         )
     if estimator in OFFLINE:
         raise ConfigError(
-            f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
+            f"{estimator!r} is an offline method: call {OFFLINE[estimator]} for a whole clip."
         )
     if estimator not in ESTIMATORS:
         raise make_unknown_name_error("estimator", estimator, ESTIMATORS)
@@ -202,7 +202,7 @@ def check_estimator(spec: EstimatorSpec) -> None:
         raise ConfigError(f"An estimator must be an EstimatorSpec, got {type(given).__name__}.")
     kind = cast(object, spec.config)
     if not (isinstance(kind, type) and issubclass(kind, TrackerConfig)):
-        raise ConfigError(f"{spec.name}: config must be a kind of TrackerConfig.")
+        raise ConfigError(f"{spec.name}: config must be a subclass of TrackerConfig.")
     for name in ("needs_pairs", "handles_late_frames"):
         check_kind(f"{spec.name}: {name}", getattr(spec, name), bool)
     made = make_estimator(spec, _P, _DT_S)
@@ -222,12 +222,12 @@ def check_estimator(spec: EstimatorSpec) -> None:
 
 
 _DEPENDS_ON_OTHERS = (
-    "an environment must have the same estimates beside others than alone: draw from rngs[b] of "
-    "environment b only, and compute nothing over the first axis"
+    "an environment must have the same estimates in a batch as alone: draw random numbers only "
+    "from rngs[b] of environment b, and do not reduce over the first axis"
 )
 _DEPENDS_ON_SELF = (
-    "a copy of the state must lead to the same estimates: keep all that changes in the state, "
-    "nothing in self, and draw from rngs only"
+    "a copy of the state must lead to the same estimates: keep everything that changes in the "
+    "state, nothing in self, and draw random numbers only from rngs"
 )
 
 

@@ -112,7 +112,9 @@ def smooth(
         ConfigError: there are no frames, or the time between them is not positive.
     """
     if len(clip) == 0 or not dt_s > 0:
-        raise ConfigError(f"a clip needs frames and a positive dt_s, got {len(clip)}, {dt_s}.")
+        raise ConfigError(
+            f"a clip must have frames, and dt_s must be positive, got {len(clip)}, {dt_s}."
+        )
     config = replace(cast_config(config, ParticleConfig), n_hypotheses=1)
     estimator = ParticleEstimator(np.ascontiguousarray(P, float), dt_s, config)
     forth = _smooth_one_way(estimator, clip, dt_s)

@@ -92,9 +92,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         arguments = {"perception": "keypoints", **arguments}
         if arguments["perception"] == "pixels":
             raise ConfigError(
-                'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
-                "process for each environment, and SB3's make_vec_env with vec_env_cls="
-                'hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it, batched.'
+                'perception="pixels" cannot be batched in one process: gymnasium.make_vec creates '
+                "one process per environment, and so does SB3's make_vec_env with "
+                'vec_env_cls=hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it and can '
+                "be batched."
             )
         settings = resolve_settings(**arguments)
         self._open(settings)
@@ -157,7 +158,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         asked = read_options(options, self.num_envs, self.max_episode_steps)
         mask, elapsed_steps = asked.mask, asked.elapsed_steps
         if self._observation is None and not mask.all():
-            raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
+            raise ConfigError(
+                "The first reset() must include all environments: leave out the reset_mask."
+            )
         ids = np.flatnonzero(mask)
         fixed = self._fix_each(ids, asked.each)
         for k in ids.tolist():
@@ -312,7 +315,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             values: a value for all environments, or a list or tuple with one value for each.
         """
         each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
-        check_shape(f"values of {name!r}", (len(each),), (self.num_envs,), "one an environment")
+        check_shape(
+            f"values of {name!r}", (len(each),), (self.num_envs,), "one entry per environment"
+        )
         for k, value in enumerate(each):
             setattr(self.member(k), name, value)
 
@@ -390,7 +395,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         over = np.flatnonzero(self._ended)
         if len(over) > 0 and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ConfigError(
-                f"The episodes of environments {over.tolist()} are over: call "
+                f"The episodes of environments {over.tolist()} have ended: call "
                 'reset(options={"reset_mask": terminations | truncations}) before step().'
             )
         if len(over) > 0 and np.shape(actions) == self.action_space.shape:

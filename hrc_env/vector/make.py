@@ -136,13 +136,15 @@ def make_vector(
     limit = PROCESSES_PER_CORE * n_cores()
     if num_envs > limit and not force:
         raise ConfigError(
-            f'num_envs={num_envs} with perception="pixels" are as many processes, each with a '
-            f"renderer and a network; on {n_cores()} cores no more than {limit} make sense. "
-            'Use perception="keypoints", which emulates the detector and steps thousands of '
+            f'num_envs={num_envs} with perception="pixels" creates as many processes, each with a '
+            f"renderer and a network; on {n_cores()} cores, at most {limit} are useful. Use "
+            'perception="keypoints", which emulates the detector and steps thousands of '
             "environments in one process, or force=True."
         )
     if kwargs.pop("num_threads", None) is not None:
-        raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
+        raise ConfigError(
+            'perception="pixels" uses processes instead of threads: leave out num_threads.'
+        )
     mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
     task = find_task(kwargs.pop("task", DEFAULT))
     if TASKS.name_of(task) is None:  # not registered: it is pickled

@@ -178,7 +178,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             valid = [each for each in dir(self) if not each.startswith("_")]
             valid += [each for each in (*ALIKE, *TOGETHER) if each not in valid]
             raise NoAttributeError(
-                str(make_unknown_name_error("attribute of one environment", name, valid))
+                str(make_unknown_name_error("attribute of a single environment", name, valid))
             )
         return self._vector.notes[self._k][name]
 
@@ -187,10 +187,10 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             super().__setattr__(name, value)
         elif name in TAKEN or hasattr(type(self), name):
             raise ConfigError(
-                f"{name!r} of one environment of many cannot be set: environments take their "
-                "settings when they are made. What can be set is `np_random`, `options` and "
-                "attributes of your own; reset(options=...), set_options(...) and set_reward(...) "
-                "change episodes and rewards."
+                f"{name!r} of a member of a vector environment cannot be set: settings are fixed "
+                "at creation. Only `np_random`, `options` and custom attributes can be set; "
+                "reset(options=...), set_options(...) and set_reward(...) change episodes and "
+                "rewards."
             )
         else:
             self._vector.notes[self._k][name] = value

@@ -57,7 +57,7 @@ def parse_threads(num_threads: int | None) -> int:
     n_threads = check_integer("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
         warnings.warn(
-            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
+            f"num_threads={n_threads} on {cores} cores: results are the same, but slower.",
             stacklevel=3,
         )
     return n_threads
@@ -73,8 +73,8 @@ def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[
     valid = [each is None or (isinstance(each, (int, np.integer)) and each >= 0) for each in given]
     if len(given) != num_envs or not all(valid):
         raise ConfigError(
-            f"seed must be a whole number >= 0 or a list of {num_envs} of them (None "
-            f"goes on with that environment's stream), got {seed!r}."
+            f"seed must be a whole number >= 0 or a list of {num_envs} of them (None continues "
+            f"with the environment's random stream), got {seed!r}."
         )
     return [None if each is None else int(each) for each in given]
 
@@ -150,8 +150,8 @@ def split_options(
         for name in own_options:
             if name in given:
                 raise ConfigError(
-                    f'The option {name!r} is given for all environments and in options["each"]'
-                    f"[{k}], too: give it once."
+                    f"The option {name!r} is given both for all environments and in "
+                    f'options["each"][{k}]: give it only once.'
                 )
         rows = {name: value[k] for name, value in by_row.items()}
         every.append({**shared, **rows, **own_options})
@@ -170,7 +170,7 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
     except ValueError:  # rows of different lengths
         return False
     if has_rows:
-        check_shape(f'options["{name}"]', lead, (num_envs,), "a row for each environment")
+        check_shape(f'options["{name}"]', lead, (num_envs,), "one row per environment")
     return has_rows
 
 
@@ -193,7 +193,7 @@ def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: in
 def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) -> Ints:
     """Return the number of elapsed steps (B,) from the option "steps_left" or "elapsed_steps"."""
     if "elapsed_steps" in steps and "steps_left" in steps:
-        raise ConfigError("elapsed_steps and steps_left say the same: give one of them.")
+        raise ConfigError("elapsed_steps and steps_left are equivalent: give only one of them.")
     if "steps_left" in steps:
         left = steps["steps_left"]
         left = np.full(num_envs, left) if np.ndim(left) == 0 else left
@@ -207,12 +207,12 @@ def _mask(mask: Any, num_envs: int) -> Bools:
     """Return a mask (B,) of the environments to reset, or raise `ConfigError` if it is invalid."""
     if not isinstance(mask, np.ndarray) or mask.dtype != bool:
         raise ConfigError(
-            'options["reset_mask"] must be a NumPy array of bool, one for each environment, '
-            f"got {mask!r}; terminations | truncations is one."
+            'options["reset_mask"] must be a NumPy array of bool, one for each environment, such '
+            f"as terminations | truncations; got {mask!r}."
         )
     check_shape("reset_mask", mask.shape, (num_envs,), "one for each environment")
     if not mask.any():
-        raise ConfigError('options["reset_mask"] must be True somewhere: nobody would start.')
+        raise ConfigError('options["reset_mask"] must be True for at least one environment.')
     return mask
 
 

@@ -66,8 +66,9 @@ class Pictures:
         if self.render_mode in LISTS:
             if camera is not None:
                 raise ConfigError(
-                    f"render_mode={self.render_mode!r} keeps pictures from the usual viewpoint: "
-                    f"leave out camera={camera!r}, or use one of {', '.join(RENDER_MODES)}."
+                    f"render_mode={self.render_mode!r} records pictures from the default "
+                    f"viewpoint: leave out camera={camera!r}, or use one of "
+                    f"{', '.join(RENDER_MODES)}."
                 )
             shown, self._film[k] = self._film[k], []
             return shown

@@ -96,8 +96,8 @@ class Shards:
         """Restore a state of the same number of simulations with the same settings."""
         if len(state) != len(self.parts):
             raise ConfigError(
-                f"The state was taken with {len(state)} threads; here there are "
-                f"{len(self.parts)}. Make the environment with num_threads={len(state)}."
+                f"The state was taken with {len(state)} threads, but here there are "
+                f"{len(self.parts)}. Create the environment with num_threads={len(state)}."
             )
         for part, saved in zip(self.parts, state, strict=True):
             part.set_state(saved)
@@ -127,7 +127,7 @@ def _collect(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepR
         except BaseException as error:
             errors.append(error)
             if isinstance(error, HRCError) and first > 0:
-                error.add_note(f"Environments are counted from number {first} of the vector here.")
+                error.add_note(f"Here, environments are counted from number {first} of the vector.")
     if errors:
         raise errors[0]
     return results

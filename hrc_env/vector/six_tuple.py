@@ -60,5 +60,5 @@ class CostVectorEnv(VectorWrapper):
 def _read_cost(info: dict[str, Any]) -> Any:
     """Return the cost from infos, or raise `ConfigError` if there is none."""
     if "cost" not in info:
-        raise ConfigError('The environment gives no info["cost"]; those of hrc_env do.')
+        raise ConfigError('The environment has no info["cost"], which those of hrc_env provide.')
     return info["cost"]

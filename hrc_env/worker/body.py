@@ -107,8 +107,8 @@ def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
     valid = (*worker_names(), ANY)
     if not names or len(set(names)) < len(names):
         raise ConfigError(
-            f"worker must be a name or several different ones of {', '.join(valid[:-1])}, "
-            f"or {ANY!r} for all of them; got {worker!r}."
+            f"worker must be one or several different names of {', '.join(valid[:-1])}, or {ANY!r} "
+            f"for all of them; got {worker!r}."
         )
     for name in names:
         if name not in worker_names():

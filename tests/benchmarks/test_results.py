@@ -235,7 +235,7 @@ def test_a_short_form_says_which_metrics_are_missing(desk, capsys):
 
 
 @pytest.mark.parametrize(
-    ("depends", "words"), [((), "it names none"), (("envs",), "Unknown subsystem 'envs'")]
+    ("depends", "words"), [((), "got none"), (("envs",), "Unknown subsystem 'envs'")]
 )
 def test_a_study_that_names_no_subsystem_or_an_unknown_one_is_refused(depends, words):
     with pytest.raises(ConfigError, match=words):

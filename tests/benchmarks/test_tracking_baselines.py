@@ -74,4 +74,4 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     stored = json.loads((tmp_path / "results.json").read_text())
     assert stored["config"]["missing"] == list(bench.LIBRARIES)
     table = (tmp_path / "report.md").read_text()
-    assert "Not installed, so not run: aniposelib, particles, filterpy" in table
+    assert "Not installed and therefore skipped: aniposelib, particles, filterpy" in table

@@ -127,8 +127,8 @@ def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(
              "gone.0": record.parts["lab.0"]}  # fmt: skip
     records.save("toy", replace(record, parts=parts))
     _, outcome = verified(tmp_path)
-    assert "its settings are not those of its record" in outcome["spoiled"]["toy"]["lab.0"]
-    assert "no longer makes it" in outcome["spoiled"]["toy"]["gone.0"]
+    assert "its settings differ from those of its record" in outcome["spoiled"]["toy"]["lab.0"]
+    assert "no longer computes it" in outcome["spoiled"]["toy"]["gone.0"]
     records.save("toy", record)
     toy(Toy("not a number"))
     _, outcome = verified(tmp_path, share=0.0)

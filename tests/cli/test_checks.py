@@ -35,7 +35,7 @@ def test_what_is_there_may_be_replaced(tmp_path: Path):
 @pytest.mark.parametrize("below", ["", "deeper/still"])
 def test_a_file_where_a_folder_is_needed_is_refused(tmp_path: Path, below: str):
     (tmp_path / "notes").write_text("")
-    with pytest.raises(HRCError, match=r"cannot be written .*Name another place with --out\."):
+    with pytest.raises(HRCError, match=r"cannot be written .*Choose another path with --out\."):
         check_writable_folder(tmp_path / "notes" / below)
 
 

@@ -88,7 +88,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(name, tmp_pat
     assert main([word.format(blocked) for word in WRITING[name]]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "cannot be written" in said
-    assert "Name another place with --" in said
+    assert "Choose another path with --" in said
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
 
 

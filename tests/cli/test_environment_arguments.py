@@ -88,7 +88,7 @@ def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):
         (["reward.proximity"], "FIELD=VALUE"),
         (["{}/mine.json"], "a .toml file"),
         (["nowhere.toml"], "cannot be read"),
-        (["{}/broken.toml"], "must be TOML"),
+        (["{}/broken.toml"], "is not valid TOML"),
     ],
 )
 def test_what_is_no_change_is_refused(words, says, tmp_path: Path):

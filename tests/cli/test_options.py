@@ -42,7 +42,9 @@ def test_switches_of_an_experiment_are_found():
 
 @pytest.mark.parametrize("words", [["--film=maybe"], ["--no-film", "True"], ["--no-her=False"]])
 def test_a_switch_with_another_value_says_what_it_takes(words):
-    with pytest.raises(ConfigError, match=r"takes True, False or no value: --\w+, --no-\w+; got"):
+    with pytest.raises(
+        ConfigError, match=r"takes True, False or no value \(--\w+, --no-\w+\); got"
+    ):
         normalize_words(Train, words, "train")
 
 

@@ -116,9 +116,9 @@ def test_parts_that_are_there_are_not_played_again(tmp_path):
     [
         (("ry",), "Did you mean 'ray'"),
         (("processes", 0), "workers must be a whole number from 1"),
-        (("serial", 2), "goes with --engine processes or --engine ray"),
-        ((None, 2), "goes with --engine processes or --engine ray"),
-        (("processes", 2, "auto"), "--address is of a cluster of Ray"),
+        (("serial", 2), "requires --engine processes or --engine ray"),
+        ((None, 2), "requires --engine processes or --engine ray"),
+        (("processes", 2, "auto"), "--address requires --engine ray"),
     ],
 )
 def test_engines_that_cannot_be_are_answered_in_words(asked, said):

@@ -159,8 +159,11 @@ def test_episodes_that_end_every_worker_end_with_its_error(cluster, shields, cap
 @pytest.mark.parametrize(
     ("shield", "error"),
     [
-        ("raises", "The last error: ValueError: this shield is broken. What was learnt is in"),
-        ("exits", "The last error: a process that was killed, or ran out of memory"),
+        (
+            "raises",
+            "The last error: ValueError: this shield is broken. The current policy is saved in",
+        ),
+        ("exits", "The last error: a process was killed or ran out of memory"),
     ],
     ids=["raises", "exits"],
 )
@@ -172,13 +175,15 @@ def test_training_that_ends_every_worker_ends_with_its_error(
     asked += ["--timesteps", "1000", "--no-film", "--out", str(tmp_path / "run")]
     assert main(["train", *asked]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "No worker has stepped in 2 updates" in said
+    assert "No worker completed a step in 2 updates" in said
     assert error in said
     assert (tmp_path / "run" / "policy.zip").exists()
 
 
 def test_workers_that_cannot_begin_say_why(cluster):
-    with pytest.raises(HRCError, match="could make its environments: Unknown estimator 'nonsense'"):
+    with pytest.raises(
+        HRCError, match="could create its environments: Unknown estimator 'nonsense'"
+    ):
         learning(1, estimator="nonsense")
 
 
@@ -337,7 +342,7 @@ def test_machines_that_cannot_work_are_named(cluster, monkeypatch):
     with pytest.raises(ConfigError, match=r"cannot import 'no_such_module'.*--import"):
         ray_cluster.check_machines(machines, lacks_a_module)
     monkeypatch.setattr(ray_cluster, "VERSION", "0.0.9")
-    with pytest.raises(ConfigError, match=r"has hrc_env .*, and this one 0.0.9"):
+    with pytest.raises(ConfigError, match=r"has hrc_env .*, but this one has 0.0.9"):
         ray_cluster.check_machines(machines)
 
 
@@ -346,7 +351,7 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
     machines = ray_cluster.list_machines()
     share = ray_cluster.share_of(5, machines, said.append)
     assert 0 < share <= 2 / 5
-    assert said == ["5 workers on 2 cores: they take turns, and nothing is faster."]
+    assert said == ["5 workers on 2 cores: the workers take turns, so that this is not faster."]
     assert ray_cluster.share_of(2, machines, said.append) == 1.0
     found = list(RayTasks(5, note=said.append).run([cores] * 6, silent))
     assert sorted(each.k for each in found) == list(range(6))

@@ -73,16 +73,16 @@ def card_of(run: Path, out: Path) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--engine", "ray", "--algorithm", "sac"], "--engine ray trains with ppo only"),
+        (["--engine", "ray", "--algorithm", "sac"], "--engine ray supports only ppo"),
         (
             ["--engine", "ray", "--cost-limit", "3", "--algorithm", "ppo_lagrangian"],
-            "trains with ppo only",
+            "supports only ppo",
         ),
         (["--engine", "ray", "--workers", "0"], "--workers must be 1 or more"),
         (["--engine", "ry"], "Did you mean 'ray'"),
-        (["--workers", "2"], "--workers needs --engine ray"),
-        (["--address", "auto"], "--address needs --engine ray"),
-        (["--perception", "pixels"], "or --engine ray"),
+        (["--workers", "2"], "--workers requires --engine ray"),
+        (["--address", "auto"], "--address requires --engine ray"),
+        (["--perception", "pixels"], "or use --engine ray"),
         (["--engine", "ray", "--address", "nowhere"], "must be auto, HOST:PORT"),
     ],
 )

@@ -69,14 +69,14 @@ def test_rates_are_compared_exactly():
     [
         (lambda: estimate_mean([[1.0, 2.0]]), r"values must have shape \(n,\).*got \(1, 2\)"),
         (lambda: estimate_mean(["a"]), "values must be numbers"),
-        (lambda: estimate_rate([0.5], 1.0), "counts must be whole numbers"),
-        (lambda: estimate_rate([-1], 1.0), "counts must be whole numbers"),
-        (lambda: estimate_rate([np.nan], 1.0), "counts must be whole numbers"),
+        (lambda: estimate_rate([0.5], 1.0), "counts must be non-negative integers"),
+        (lambda: estimate_rate([-1], 1.0), "counts must be non-negative integers"),
+        (lambda: estimate_rate([np.nan], 1.0), "counts must be non-negative integers"),
         (lambda: estimate_rate([1], -1.0), "exposure must not be negative"),
         (lambda: estimate_share([0.5]), "outcomes must be true or false"),
         (lambda: estimate_share([np.nan]), "outcomes must be true or false"),
         (lambda: compare_means([1.0], [1.0, 2.0]), "must have the same seeds, got 1 and 2"),
-        (lambda: compare_rates([0.5], [1], 1.0, 1.0), "counts must be whole numbers"),
+        (lambda: compare_rates([0.5], [1], 1.0, 1.0), "counts must be non-negative integers"),
     ],
 )
 def test_what_cannot_be_counted_is_refused(call, said):

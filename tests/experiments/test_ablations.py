@@ -162,7 +162,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
 def test_what_cannot_work_is_explained(tmp_path):
     with pytest.raises(ConfigError, match="Did you mean 'cameras'"):
         make_experiment(studies=("camera",))
-    with pytest.raises(ConfigError, match="--studies needs a name"):
+    with pytest.raises(ConfigError, match="--studies requires at least one"):
         make_experiment(studies=())
     with pytest.raises(ConfigError, match="--seeds must be at least 1"):
         make_experiment(seeds=0)

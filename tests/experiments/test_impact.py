@@ -301,7 +301,7 @@ def test_a_policy_that_did_not_learn_is_left_out_and_named(tmp_path):
     metrics = compute_metrics(table, ())
     robots = {"scripted": "scripted", "ppo": "ppo"}
     found = make_report(tmp_path / "figures", table, metrics, robots)
-    assert "`ppo` did not learn its task (0.0 goals a minute" in found.question
+    assert "`ppo` did not learn its task (0.0 goals per minute" in found.question
     assert not any("| ppo" in part for part in found.parts)
     alone = make_report(tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"})
     assert alone.parts == ()

@@ -320,7 +320,7 @@ def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_
     quick = replace(whole, quick=report.describe_quick_run(4, 10.0))
     quick.write(tmp_path, {}, [0], metrics)
     text = (tmp_path / "report.md").read_text()
-    assert text.count("Quick run, 4 seeds of 10 s: too few to compare anything.") == 3
+    assert text.count("Quick run, 4 seeds of 10 s: too few for comparisons.") == 3
     assert "●" not in text
     after = Image.open(tmp_path / "figures" / "one.png").size
     assert after[0] == before[0]
@@ -329,7 +329,7 @@ def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_
 
 def test_seeds_of_a_quick_run_are_counted_in_words():
     one = report.describe_quick_run(1, (2.0, 7.25), "round")
-    assert one == "Quick run, 1 round of 2 to 7.25 s: too few to compare anything."
+    assert one == "Quick run, 1 round of 2 to 7.25 s: too few for comparisons."
 
 
 METRICS = {"a.x": Metric(0.25, 0.2, 0.5, "share", 8), "b.x": Metric(np.nan, 0.0, 0.0, "share", 0),

@@ -167,7 +167,7 @@ BARE = Row("", 2, setup=TRUTH, baseline="bare")
         ({"rows": {"a": Row("", 2, env={"perception": "truth"})}},
          "which comes from the row's setup"),
         ({"rows": {"a": Row("", 0)}}, "n_episodes and n_together must be at least 1, got 0"),
-        ({"rows": {"a": ROW}}, "names no baseline, and 'a.share' compares it with one"),
+        ({"rows": {"a": ROW}}, "has no baseline, which 'a.share' requires"),
         ({"rows": {"bare": BARE, "a": Row("", 2, setup=TRUTH, baseline="bear")}},
          "baseline of row 'a'.*Did you mean 'bare'"),
         ({"rows": {"bare": BARE, "a": Row("", 3, setup=TRUTH, baseline="bare")}},

@@ -52,10 +52,10 @@ def test_the_file_of_this_repository_names_every_subsystem():
 @pytest.mark.parametrize(
     ("other", "words"),
     [
-        ({"tracker": -1}, "give tracker a whole number from 1 on, and gives -1"),
-        ({"tracker": 0}, "gives 0"),
-        ({"env": 1.5}, r"give env a whole number from 1 on, and gives 1\.5"),
-        ({"env": "true"}, "gives True"),
+        ({"tracker": -1}, "give tracker a whole number from 1 on, got -1"),
+        ({"tracker": 0}, "got 0"),
+        ({"env": 1.5}, r"give env a whole number from 1 on, got 1\.5"),
+        ({"env": "true"}, "got True"),
         ({"traker": 1}, "Unknown subsystem in behaviour.toml 'traker'. Did you mean 'tracker'"),
         ({"env": "one"}, "must be lines such as `env = 1`"),
     ],
@@ -68,17 +68,17 @@ def test_a_file_with_wrong_versions_is_refused_in_words(behaviour, other, words)
 
 def test_a_file_that_is_missing_or_leaves_a_subsystem_out_is_refused_in_words(tmp_path):
     path = tmp_path / "behaviour.toml"
-    with pytest.raises(ConfigError, match=r"There is no behaviour\.toml.*git checkout"):
+    with pytest.raises(ConfigError, match=r"The file behaviour\.toml .* is missing.*git checkout"):
         read_versions(path)
     path.write_text("env = 1\n")
-    with pytest.raises(ConfigError, match="give tracker a whole number from 1 on, and gives noth"):
+    with pytest.raises(ConfigError, match="give tracker a whole number from 1 on, got noth"):
         read_versions(path)
 
 
 @pytest.mark.parametrize(
     ("depends", "words"),
     [
-        ((), r"must name the subsystems.*at least one of env, .*it names none"),
+        ((), r"must name the subsystems.*at least one of env, .*got none"),
         (("trackers",), "Unknown subsystem 'trackers'. Did you mean 'tracker'"),
     ],
 )

@@ -83,8 +83,8 @@ def test_mappings_and_rig_files_take_matrices_too(tmp_path):
     [
         ({"K": K.T}, r"K must be \[\[fx, 0, cx\]"),
         ({"K": K + np.diag([5.0, 0.0], 1)}, "without skew"),
-        ({"T_world_from_cam": np.diag([1.0, 1.0, -1.0, 1.0])}, "must be .4, 4., a rotation"),
-        ({"T_world_from_cam": pose(0)[:3]}, "must be .4, 4., a rotation"),
+        ({"T_world_from_cam": np.diag([1.0, 1.0, -1.0, 1.0])}, "must be .4, 4.: a rotation"),
+        ({"T_world_from_cam": pose(0)[:3]}, "must be .4, 4.: a rotation"),
         ({"distortion": (0.1,) * 8}, "got 8 coefficients"),
     ],
 )
@@ -145,7 +145,7 @@ def test_fisheyes_matrices_of_rotation_and_other_spellings_are_read(tmp_path):
 def test_millimetres_are_told_and_read(tmp_path):
     usual = read_rig(calibration(tmp_path, *map(table, range(4))))
     path = calibration(tmp_path, *(table(k, unit_m=1e-3) for k in range(4)))
-    with pytest.warns(UserWarning, match=r"in millimetres: the cameras are up to 7\.7\d m"):
+    with pytest.warns(UserWarning, match=r"as millimetres; the cameras are up to 7\.7\d m"):
         cameras = read_rig(path)
     for camera, other in zip(cameras, usual, strict=True):
         assert np.allclose(camera.eye_world, other.eye_world)
@@ -155,19 +155,21 @@ def test_millimetres_are_told_and_read(tmp_path):
 def test_a_world_whose_z_axis_is_not_up_is_told(tmp_path):
     turn = about_axis("x", np.pi / 2)
     upright = [table(k, turn=turn, name=f'"{k}"') for k in (0,)]
-    with pytest.warns(UserWarning, match=r"its world's -y axis seems to be up.*here \+z is up"):
+    with pytest.warns(
+        UserWarning, match=r"the -y axis of its world seems to point up.*\+z to point up"
+    ):
         read_rig(calibration(tmp_path, *upright))
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"rotation": None}, "table 'cam_0'.*missing rotation. It has no place in the world yet"),
+        ({"rotation": None}, "table 'cam_0'.*missing rotation. It has no pose in the world yet"),
         ({"size": None}, "missing size"),
         ({"translation": [1, 2]}, r"translation must be 3 numbers, got \[1, 2\]"),
         ({"distortions": [0.1] * 8}, "got 8 coefficients"),
         ({"matrix": (K.T).tolist()}, "K must be"),
-        ({"ignore": "true"}, "holds no camera"),
+        ({"ignore": "true"}, "contains no cameras"),
     ],
 )
 def test_a_calibration_that_lacks_something_is_refused_in_words(tmp_path, changes, said):

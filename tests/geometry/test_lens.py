@@ -87,9 +87,9 @@ def test_a_camera_of_an_unknown_make_is_told_those_that_there_are():
         ({"focal_px": (0.0, 900.0)}, "focal lengths must be positive"),
         ({"focal_px": (900.0,)}, "two numbers"),
         ({"centre_px": (2000.0, 540.0)}, "principal point"),
-        ({"lens": Lens("brown_conrady", (-0.5,))}, "fold the image over"),
-        ({"lens": Lens("brown_conrady", (-0.5,)), "focal_px": (600.0, 600.0)}, "let light through"),
-        ({"target_world": (0.0, 0.0, 2.4)}, "another place"),
+        ({"lens": Lens("brown_conrady", (-0.5,))}, "be monotonic"),
+        ({"lens": Lens("brown_conrady", (-0.5,)), "focal_px": (600.0, 600.0)}, "reach the center"),
+        ({"target_world": (0.0, 0.0, 2.4)}, "must differ from its position"),
         ({"eye_world": (float("nan"), 0.0, 1.0)}, "finite"),
     ],
 )

@@ -43,7 +43,7 @@ def test_it_depends_on_where_the_tool_points(x_m, along, fits):
 
 
 def test_goals_too_far_away_are_refused():
-    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like', .* nearer"
+    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like': .* closer"
     for task in ("HRCReach-v0", "HRCReachGoal-v0"):
         with pytest.raises(ConfigError, match=said):
             gymnasium.make(task, perception="none", config={"task": {"distance_m": (2.0, 2.5)}})
@@ -79,5 +79,5 @@ def test_an_arm_that_is_too_short_for_most_goals_is_refused(size, fits):
         if fits:
             check_reach(task, "short", short, [middle])
         else:
-            with pytest.raises(ConfigError, match=r"the middle of its goals at .* out of reach"):
+            with pytest.raises(ConfigError, match=r"the center of its goals at .* out of reach"):
                 check_reach(task, "short", short, [middle])

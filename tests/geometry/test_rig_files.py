@@ -38,10 +38,10 @@ def test_a_file_needs_names_and_places_only(tmp_path):
         ('[[camera]]\nname = "a"\neye_world = [1, 2, 3]\nhfov = 90\n', "hfov_deg"),
         ('[[camera]]\nname = "a"\neye_world = [1, 2]\n', "3 values"),
         ('[[camera]]\nname = "a"\neye_world = [1, 2, 3]\nhfov_deg = 999\n', "field of view"),
-        ('[[cameras]]\nname = "a"\n', "a \\[\\[camera\\]\\] for each"),
-        ("camera = 3\n", "a \\[\\[camera\\]\\] for each"),
+        ('[[cameras]]\nname = "a"\n', "a \\[\\[camera\\]\\] table for each"),
+        ("camera = 3\n", "a \\[\\[camera\\]\\] table for each"),
         ("", "no camera"),
-        ("camera = [", "must be TOML"),
+        ("camera = [", "is not valid TOML"),
     ],
 )
 def test_a_wrong_file_is_refused_in_words_that_name_it(tmp_path, text, said):
@@ -78,9 +78,9 @@ def test_cameras_are_names_places_records_or_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("cameras", "said"),
     [
-        ("camera_1", "is no rig"),
-        ([(1, 2, 3), "camera_1"], "of your own"),
-        ([(1, 2)], "of your own"),
+        ("camera_1", "is not a rig"),
+        ([(1, 2, 3), "camera_1"], "of a custom rig"),
+        ([(1, 2)], "of a custom rig"),
         ([], 'perception="none"'),
         ([(float(k), 0.1 * k, 2.0) for k in range(1, 18)], "1 to 16"),
     ],
@@ -112,7 +112,7 @@ def test_a_wide_lens_is_tracked_as_well_as_a_pinhole():
 
 
 def test_one_camera_works_and_it_is_said_what_is_lost():
-    with pytest.warns(UserWarning, match="one camera, 'camera_2'.*usual size"):
+    with pytest.warns(UserWarning, match="a single camera, 'camera_2'.*usual size"):
         env = HRCEnv(perception="keypoints", cameras=["camera_2"])
     env.reset(seed=0)
     assert "tracking/lost" in [env.step(np.zeros(6)) for _ in range(10)][-1][4]
@@ -121,7 +121,11 @@ def test_one_camera_works_and_it_is_said_what_is_lost():
 @pytest.mark.parametrize(
     ("eye", "target", "said"),
     [
-        ((2.0, 2.0, 2.0), (2.0, 2.1, 4.0), "sees 0 % of the workspace: it looks elsewhere"),
+        (
+            (2.0, 2.0, 2.0),
+            (2.0, 2.1, 4.0),
+            "sees 0 % of the workspace: it looks in another direction",
+        ),
         ((3.2, 0.0, 1.5), (0.0, 0.0, 1.0), "behind a wall"),
     ],
 )
@@ -133,7 +137,9 @@ def test_a_poorly_hung_camera_is_told_what_it_sees(eye, target, said):
 
 @pytest.mark.parametrize("cameras", [["camera_2"], RigDistribution(n_cameras=(1, 3))])
 def test_who_needs_pairs_is_told_of_rigs_of_one_camera(cameras):
-    with pytest.warns(UserWarning, match="'triangulation' needs two .*finds nobody: add a camera"):
+    with pytest.warns(
+        UserWarning, match="'triangulation' needs two cameras .*will detect no people: add a camera"
+    ):
         HRCEnv(perception="keypoints", cameras=cameras, estimator="triangulation")
 
 

@@ -113,19 +113,19 @@ def shortened(path, keep):
 
 
 def test_a_file_that_is_cut_off_in_its_skeleton_is_refused(work, tmp_path):
-    with pytest.raises(ConfigError, match=r"walk\.bvh.*(cut off|expected)"):
+    with pytest.raises(ConfigError, match=r"walk\.bvh.*(truncated|expected)"):
         read_recording(shortened(written(work, tmp_path), 0.003))
 
 
 def test_a_file_with_too_few_of_its_frames_is_refused(work, tmp_path):
-    with pytest.raises(ConfigError, match=r"announces \d+ frames"):
+    with pytest.raises(ConfigError, match=r"declares \d+ frames"):
         read_recording(shortened(written(work, tmp_path), 0.3))
 
 
 def test_a_file_that_lost_its_last_frames_is_read_with_a_warning(work, tmp_path):
     capture = read_recording(shortened(written(work, tmp_path), 0.9))
     assert 0.8 < len(capture.joints_world) / len(work.joints) < 1.0
-    assert "frames are announced" in " ".join(capture.notes)
+    assert "frames are declared" in " ".join(capture.notes)
 
 
 @pytest.mark.parametrize(
@@ -136,8 +136,8 @@ def test_a_file_that_lost_its_last_frames_is_read_with_a_warning(work, tmp_path)
         ("CHANNELS 3", "CHANNELS 4", "expected CHANNELS"),
         ("Zrotation", "Wrotation", "expected CHANNELS"),
         ("OFFSET 0.", "OFFSET zero.", "expected a number"),
-        ("LeftForeArm", "LeftBranch", r"Missed: left_elbow.*Found: .*left_wrist = LeftHand"),
-        ("Hand", "Paw", "Missed: left_wrist, right_wrist|forearm"),
+        ("LeftForeArm", "LeftBranch", r"Missing: left_elbow.*Found: .*left_wrist = LeftHand"),
+        ("Hand", "Paw", "Missing: left_wrist, right_wrist|forearm"),
     ],
 )
 def test_a_damaged_or_unknown_file_is_refused_in_words(work, tmp_path, old, new, told):
@@ -158,7 +158,7 @@ def test_a_frame_with_a_word_or_a_missing_number_is_refused(work, tmp_path):
 def test_a_motion_without_its_skeleton_is_refused(work, tmp_path):
     path = write_acclaim(tmp_path, work.position[:50], work.rotation[:50])
     (tmp_path / "walk.asf").unlink()
-    with pytest.raises(ConfigError, match="needs its skeleton"):
+    with pytest.raises(ConfigError, match="requires its skeleton"):
         read_recording(path)
     (tmp_path / "walk.fbx").write_text("")
     with pytest.raises(ConfigError, match=r"ends in \.bvh, \.amc, \.npz"):
@@ -177,7 +177,7 @@ def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_pa
         with pytest.raises(ConfigError, match=told):
             read_recording(path)
     path.write_bytes(path.read_bytes()[:200])
-    with pytest.raises(ConfigError, match="cut off"):
+    with pytest.raises(ConfigError, match="truncated"):
         read_recording(path)
 
 

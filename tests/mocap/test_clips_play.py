@@ -103,7 +103,7 @@ def test_what_is_accepted_off_the_floor_is_played_from_the_floor_to_the_floor(tm
 def test_the_shortest_clips_play(tmp_path, n_frames, capsys):
     short = stride(0)
     clip = imported(written_as("npz", short._replace(joints=short.joints[:n_frames]), tmp_path))
-    assert "plays in lab (0." in " ".join(capsys.readouterr().out.split())
+    assert "can be played in lab (0." in " ".join(capsys.readouterr().out.split())
     assert plays(clip, "lab")
 
 
@@ -116,7 +116,7 @@ def test_a_clip_that_fits_nowhere_is_not_called_ready(tmp_path, work, capsys):
     np.savez(tmp_path / "hop.npz", joints=joints, fps=work.fps)
     imported(tmp_path / "hop.npz")
     said = " ".join(capsys.readouterr().out.split())
-    assert "It has no room in lab, site." in said
+    assert "There is no room for it in lab, site." in said
     assert "play it" not in said
 
 
@@ -146,10 +146,13 @@ def leap(length_m):
 def test_a_clip_without_room_is_refused_with_the_scenes_that_have_it():
     clip = leap(5.5)
     assert measure_played_s(clip, all_grounds())["lab"] == 0.0
-    with pytest.raises(ConfigError, match=r"leap: there is no room.*plays in site \(.*lab\."):
+    with pytest.raises(ConfigError, match=r"leap: there is no room.*played in site \(.*lab\."):
         gymnasium.make("HRCReach-v0", perception="none", motions=[clip])
     assert plays(clip, "site")
     far = leap(30.0)
-    assert describe_fit(far, measure_played_s(far, all_grounds())) == "It has no room in lab, site."
+    assert (
+        describe_fit(far, measure_played_s(far, all_grounds()))
+        == "There is no room for it in lab, site."
+    )
     with pytest.raises(ConfigError, match="leap: there is no room"):
         gymnasium.make("HRCReach-v0", perception="none", scene="site", motions=[far])

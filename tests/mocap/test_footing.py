@@ -49,7 +49,7 @@ def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_pat
 def test_a_floor_that_is_slightly_aslant_is_levelled_and_said(work, tmp_path, degrees):
     aslant = work.joints @ about_axis("y", np.radians(degrees)).T
     capture = read_recording(saved(tmp_path, aslant))
-    assert re.search(rf"aslant by {abs(degrees):.1f} degrees", " ".join(capture.notes))
+    assert re.search(rf"tilted by {abs(degrees):.1f} degrees", " ".join(capture.notes))
     assert np.abs(capture.joints_world - work.joints)[..., 2].max() < 0.03
 
 
@@ -159,7 +159,9 @@ def test_a_skeleton_that_says_to_be_another_subjects_is_refused(tmp_path):
     path = write_acclaim(tmp_path, walked.position, walked.rotation, walked.body, "02_01")
     skeleton = path.with_suffix(".asf").rename(tmp_path / "35.asf")
     for given in (None, skeleton):
-        with pytest.raises(ConfigError, match=r"of subject 2, 35\.asf the skeleton of subject 35"):
+        with pytest.raises(
+            ConfigError, match=r"of subject 2, but 35\.asf is the skeleton of subject 35"
+        ):
             read_recording(path, skeleton=given)
     skeleton.rename(tmp_path / "2.asf")
     assert read_recording(path, source_fps=FPS).fps == FPS

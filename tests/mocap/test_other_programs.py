@@ -89,10 +89,10 @@ def test_files_that_differ_in_names_alone_are_the_same_person(work, tmp_path, pr
 def test_what_hangs_where_an_unknown_name_stands_is_said(work, tmp_path):
     called = segment_names(*PROGRAMS["a program of its own"])
     said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).notes)
-    assert "left_elbow was taken to be L_Cubitus, which hangs between L_UpperArm and L_Ha" in said
+    assert "left_elbow is assumed to be L_Cubitus, which lies between L_UpperArm and L_Ha" in said
     called = segment_names(*PROGRAMS["Rigify"])
     said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).notes)
-    assert "The head was taken to be spine.006" in said
+    assert "The head is assumed to be spine.006" in said
 
 
 def numbered(segment):
@@ -112,7 +112,7 @@ BY_HAND = {
 
 def test_names_that_say_nothing_are_told_by_hand(work, tmp_path):
     path, _ = written(work, tmp_path, name=numbered)
-    with pytest.raises(ConfigError, match=r"Missed: left_shoulder.*--joint left_shoulder=NAME"):
+    with pytest.raises(ConfigError, match=r"Missing: left_shoulder.*--joint left_shoulder=NAME"):
         read_recording(path)
     capture = read_recording(path, joints=BY_HAND)
     assert capture.node_names[JOINT["left_knee"]] == BY_HAND["left_knee"]
@@ -197,7 +197,7 @@ def test_numbers_that_are_none_are_missing_joints_and_never_0(work, tmp_path, no
     lines[-30] = " ".join([*words[:6], nothing, *words[7:]])
     path.write_text("\n".join(lines))
     mended = read_recording(path)
-    assert "were filled in" in mended.notes[0]
+    assert "were interpolated" in mended.notes[0]
     assert np.abs(mended.joints_world - usual.joints_world).max() < 0.02
 
 
@@ -254,7 +254,7 @@ def test_places_that_are_0_at_rest_are_added_to_offset_and_that_is_said(work, tm
     path.write_text(f"{head}MOTION\n" + "\n".join(rows))
     other = read_recording(path)
     assert np.allclose(other.joints_world, usual.joints_world)
-    assert "Places were added to OFFSET" in " ".join(other.notes)
+    assert "Positions were added to OFFSET" in " ".join(other.notes)
 
 
 # --- People --------------------------------------------------------------------------------------

@@ -158,7 +158,7 @@ def test_motions_come_as_paths_or_clips(clip, tmp_path):
     assert resolve_settings(config=by_path, motions=None).config.motion is by_path.motion
     with pytest.raises(ConfigError, match=r"motions\[0\] must be a str, got 3"):
         resolve_settings(motions=[3])
-    with pytest.raises(ConfigError, match="There is no clip"):
+    with pytest.raises(ConfigError, match=r"The clip .* does not exist"):
         generator.make_state(
             1, 1, BODY, resolve_settings(motions=[tmp_path / "none.npz"]).config.motion
         )

@@ -56,7 +56,7 @@ def test_a_file_of_another_version_is_refused_with_the_command_that_makes_a_new_
 def test_a_broken_file_is_refused(tmp_path, text):
     path = tmp_path / "broken.json"
     path.write_text(text)
-    with pytest.raises(ConfigError, match="is no calibration of keypoints"):
+    with pytest.raises(ConfigError, match="is not a calibration of keypoints"):
         read_calibration(path)
 
 

@@ -234,7 +234,7 @@ def test_a_network_that_there_is_not_is_told_those_that_there_are():
 
 def test_wrong_shapes_are_explained(four):
     detector, stills = four
-    with pytest.raises(ConfigError, match="one a camera"):
+    with pytest.raises(ConfigError, match="one entry per camera"):
         detector.detect(stills, [WINDOW] * 3)
 
     class Small:
@@ -251,5 +251,9 @@ def test_eyes_without_weights_and_network_say_so_at_once(tmp_path, monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
     with pytest.raises(WeightsError, match="no route to host") as error:
         new_detector(1)
-    for part in ("python -m hrc_env setup", "Without a network: copy", "perception='keypoints'"):
+    for part in (
+        "python -m hrc_env setup",
+        "Without a network connection, copy",
+        "perception='keypoints'",
+    ):
         assert part in str(error.value)

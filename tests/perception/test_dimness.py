@@ -84,7 +84,7 @@ def test_cameras_whose_pictures_are_blank_see_nobody_and_prove_nothing():
 
 @pytest.mark.parametrize("changes", [{"tint": 0.2}, {"light": (0.2, 1.0), "hat": 0.5}])
 def test_looks_that_are_not_light_need_images(changes):
-    with pytest.raises(ConfigError, match="knows the strength of the light alone"):
+    with pytest.raises(ConfigError, match="supports only the intensity of the light"):
         HRCEnv(perception="keypoints", appearance=changes)
 
 

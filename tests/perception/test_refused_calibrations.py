@@ -37,8 +37,8 @@ def tables_with(name: str, value: float) -> dict[str, object]:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"format": None}, "is no calibration"),
-        ({"format": FORMAT + "s"}, "is no calibration"),
+        ({"format": None}, "is not a calibration"),
+        ({"format": FORMAT + "s"}, "is not a calibration"),
         ({"version": None}, "version None"),
         ({"version": VERSION + 1}, f"version {VERSION + 1}"),
         ({"version": VERSION - 1}, f"version {VERSION - 1}"),

@@ -104,7 +104,9 @@ def test_the_first_make_at_pixels_fetches_what_is_missing_and_says_so(
         gymnasium.make("HRCReach-v0", perception="pixels").close()
     assert len(pip_brings) == 1
     (said,) = [each.message for each in caplog.records if each.name == "hrc_env.weights"]
-    assert said.startswith("Fetching the pose network's weights (mediapipe==0.10.21, 36 MB)")
+    assert said.startswith(
+        "Downloading the weights of the pose network (mediapipe==0.10.21, 36 MB)"
+    )
     assert str(empty_cache) in said
 
 

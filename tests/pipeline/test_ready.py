@@ -54,7 +54,7 @@ def test_a_film_without_a_network_says_so_before_anything_is_compiled(
     monkeypatch.setattr(ahead, "missing", lambda *_: pytest.fail("too early"))
     assert main(["demo", "--out", str(tmp_path / "film.mp4")]) == 2
     said = capsys.readouterr().err
-    for part in ("WeightsError", "no route to host", "Without a network: copy"):
+    for part in ("WeightsError", "no route to host", "Without a network connection, copy"):
         assert part in said
 
 

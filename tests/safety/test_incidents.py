@@ -128,8 +128,8 @@ def test_every_capsule_of_a_body_is_of_a_region():
 @pytest.mark.parametrize(
     ("components", "words"),
     [
-        ((), "one or more different ones"),
-        (("contact", "contact"), "one or more different ones"),
+        ((), "one or more different names"),
+        (("contact", "contact"), "one or more different names"),
         (("contacts",), "Unknown cost component 'contacts'"),
     ],
 )

@@ -465,7 +465,7 @@ def test_margins_that_are_no_numbers_are_refused():
 
 @pytest.mark.parametrize(
     ("missing", "said"),
-    [("model", "A robot's model"), ("command", "The command in force")],
+    [("model", "The robot's model"), ("command", "The current command")],
 )
 def test_what_a_shield_lacks_is_said(missing, said):
     _, now = believed()

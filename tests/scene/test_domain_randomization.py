@@ -71,7 +71,7 @@ def test_what_cannot_be_is_refused(field, value, words):
 
 @pytest.mark.parametrize("make", [HRCEnv, lambda **k: HRCVectorEnv(2, **k)])
 def test_without_images_looks_are_refused(make):
-    with pytest.raises(ConfigError, match="Looks are of images"):
+    with pytest.raises(ConfigError, match="Appearances need images"):
         make(perception="keypoints", appearance="varied")
 
 

@@ -107,7 +107,7 @@ def test_pictures_need_no_display(process):
 @pytest.mark.parametrize(
     ("backend", "said"),
     [
-        ("glfw", "No window system answers (DISPLAY=':99'"),
+        ("glfw", "No window system is available (DISPLAY=':99'"),
         ("nonsense", "Valid: 'egl', 'osmesa', 'glfw'"),
         ("off", "unset it"),
     ],
@@ -138,7 +138,7 @@ def test_without_a_library_truth_works_and_pictures_say_what_to_do(process):
     done = process("-c", TRUTH, MUJOCO_GL="osmesa")
     assert done.returncode == 0, done.stderr
     assert "RenderingError" in done.stdout
-    assert "there is no library libOSMesa" in done.stdout
+    assert "the library libOSMesa is missing" in done.stdout
     assert "apt-get install" in done.stdout
 
 
@@ -152,5 +152,5 @@ def test_a_driver_that_draws_nothing_is_not_called_ok(monkeypatch):
 def test_the_viewer_does_not_wait_for_a_dead_display(monkeypatch):
     monkeypatch.setattr("glfw.init", lambda: 0)
     monkeypatch.setattr("mujoco.viewer.launch_passive", lambda *_: pytest.fail("it would wait"))
-    with pytest.raises(RenderingError, match="No window system answers"):
+    with pytest.raises(RenderingError, match="No window system is available"):
         Viewer(build(n_workers=1))

@@ -93,7 +93,7 @@ def test_an_object_must_be_of_boxes_round_its_origin():
         '<body name="off"><freejoint/><geom type="box" size="0.1 0.1 0.1" pos="0.2 0 0" '
         'contype="16"/></body>'
     )
-    for body, said in ((ball, "must be of boxes"), (off, "middle at its origin")):
+    for body, said in ((ball, "must be of boxes"), (off, "center at its origin")):
         with pytest.raises(ConfigError, match=said):
             scene(task_scene=TaskScene(f"<mujoco><worldbody>{body}</worldbody></mujoco>"))
 

@@ -72,7 +72,7 @@ def test_what_cannot_be_asked_is_refused():
     model = mujoco.MjModel.from_xml_string(
         '<mujoco><worldbody><geom name="egg" type="ellipsoid" size="1 2 3"/></worldbody></mujoco>'
     )
-    with pytest.raises(HRCError, match="'egg' cannot block sight"):
+    with pytest.raises(HRCError, match="'egg' cannot block lines of sight"):
         find_obstacles(model)
 
 

@@ -144,7 +144,7 @@ def test_a_broken_simulation_is_named():
     state = physics.get_state()
     state[1] = 1e12
     physics.set_state(state)
-    with pytest.raises(HRCError, match="environment 1 broke down"):
+    with pytest.raises(HRCError, match="environment 1 became unstable"):
         physics.step(np.zeros((3, 6)), make_empty_path(3, 5))
 
 

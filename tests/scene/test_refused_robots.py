@@ -37,7 +37,10 @@ ARM = Robot("arm", BARE, ("turn", "lift"), ("turret", "boom"), ("boom",), "tip",
 HAND = Hand(("left", "right"), (), "close", ("thumb",))
 GRIPPER = replace(ARM, mjcf=GRIPPING, capsules=("turret", "boom", "thumb"), hand=HAND)
 CUPS = Suction("tip", "gauge", 10.0, (), ("boom",))
-IN_ORDER, SERVOS = "must be all of its MJCF, in its order", "needs an <intvelocity> for every joint"
+IN_ORDER, SERVOS = (
+    "must be all joints of its MJCF, in the same order",
+    "needs an <intvelocity> for every joint",
+)
 
 
 def changed(robot: Robot, *edits: tuple[str, str], **fields: object) -> Robot:
@@ -123,14 +126,14 @@ REFUSED = {
         changed(ARM, (TIP, ""), (RODS["socket"], RODS["socket"] + TIP)), "must be on the last"),
     "no such tool": (replace(ARM, tool_site="top"), "has no site 'top'"),
     "a capsule on the foot": (
-        replace(ARM, capsules=("socket", "boom")), "'socket' is on no link"),
+        replace(ARM, capsules=("socket", "boom")), "'socket' is not part of a link"),
     "a sphere among the capsules": (
         changed(ARM, (RODS["boom"], '<geom name="boom" type="sphere" size=".03"/>')),
         "'boom' must be a capsule"),
-    "home above the last range": (replace(ARM, home_q=(0.0, 1.0001)), "outside of the joints'"),
-    "home above the first range": (replace(ARM, home_q=(1.0001, 0.0)), "outside of the joints'"),
-    "home below the last range": (replace(ARM, home_q=(0.0, -2.0001)), "outside of the joints'"),
-    "home below the first range": (replace(ARM, home_q=(-2.0001, 0.0)), "outside of the joints'"),
+    "home above the last range": (replace(ARM, home_q=(0.0, 1.0001)), "outside the joints'"),
+    "home above the first range": (replace(ARM, home_q=(1.0001, 0.0)), "outside the joints'"),
+    "home below the last range": (replace(ARM, home_q=(0.0, -2.0001)), "outside the joints'"),
+    "home below the first range": (replace(ARM, home_q=(-2.0001, 0.0)), "outside the joints'"),
     "a first link without mass": (
         changed(ARM, (f'<body name="turret" pos="0 0 .1">{WEIGHT}', '<body name="turret">')),
         "'turret' needs an <inertial>"),

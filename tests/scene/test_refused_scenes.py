@@ -85,10 +85,10 @@ def test_an_object_of_boxes_round_its_origin_is_taken(geoms):
         ((BALL.format(bit=16, at="0 0 0"),), "must be of boxes"),
         ((BOX, BALL.format(bit=16, at="0 0 0")), "must be of boxes"),
         ((BALL.format(bit=16, at="0 0 0"), BOX), "must be of boxes"),
-        ((ABOVE,), "must have its middle at its origin"),
-        ((BELOW,), "must have its middle at its origin"),
-        ((BOX.replace("/>", ' pos="6e-7 0 0"/>'),), "must have its middle at its origin"),
-        ((BOX, BOX.replace("/>", ' pos="0 0 .05"/>')), "must have its middle at its origin"),
+        ((ABOVE,), "must have its center at its origin"),
+        ((BELOW,), "must have its center at its origin"),
+        ((BOX.replace("/>", ' pos="6e-7 0 0"/>'),), "must have its center at its origin"),
+        ((BOX, BOX.replace("/>", ' pos="0 0 .05"/>')), "must have its center at its origin"),
     ],
 )
 def test_an_object_in_which_one_thing_is_wrong_is_refused(geoms, said):
@@ -118,7 +118,7 @@ def test_what_stands_still_blocks_sight(kind):
     ("kind", "parent"), [("ellipsoid", '<body name="foot">'), ("box", MOVING), ("sphere", MOVING)]
 )
 def test_what_moves_or_is_of_another_kind_does_not_block_sight(kind, parent):
-    with pytest.raises(HRCError, match="'it' cannot block sight"):
+    with pytest.raises(HRCError, match="'it' cannot block lines of sight"):
         find_obstacles(standing(kind, parent))
 
 
@@ -159,5 +159,5 @@ def test_physics_that_break_down_are_told_of_beside_workers_and_without(alone):
     state[1] = 1e12
     physics.set_state(state)
     away = np.full(2, alone)
-    with pytest.raises(HRCError, match="physics of environment 1 broke down"):
+    with pytest.raises(HRCError, match="physics of environment 1 became unstable"):
         physics.step(np.zeros((2, 6)), make_empty_path(2, 5), out_of_reach=away)

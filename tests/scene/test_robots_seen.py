@@ -84,13 +84,13 @@ def test_capsules_are_fitted_to_what_is_drawn_not_to_what_collides(servoed):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"mjcf": "<mujoco><worldbody/></mujoco>"}, "hinges and slides only"),
+        ({"mjcf": "<mujoco><worldbody/></mujoco>"}, "only hinges and slides"),
         ({"mjcf": SERVOED.replace('axis="0 0 1" range="-170 170"', 'type="ball"')}, "1 ball joint"),
         ({"mjcf": "no_such_file.xml"}, "must be an MJCF"),
         ({"mjcf": "<mujoco><nothing/></mujoco>"}, "must be an MJCF"),
         ({"mjcf": 3}, "mjcf must be a str or Path"),
         ({"tool_site": "tup"}, "Did you mean 'tip'"),
-        ({"fastest_rad_s": (1.0, 1.0)}, "one of each of 3 joints"),
+        ({"fastest_rad_s": (1.0, 1.0)}, "one for each of 3 joints"),
         ({"fastest_rad_s": 0.0}, "must be positive"),
     ],
 )
@@ -122,7 +122,7 @@ def quarters(picture):
 def test_a_robot_given_directly_is_checked_as_a_registered_one_is():
     arm = ROBOTS["ur10e_like"]
     for changes, said in (
-        ({"home_q": (0.0, -1.9, 4.0, -1.8, -1.6, 0.0)}, "outside of the joints' ranges"),
+        ({"home_q": (0.0, -1.9, 4.0, -1.8, -1.6, 0.0)}, "outside the joints' ranges"),
         ({"spread_rad": (30.0,) * 6}, "spread_rad must be from 0"),
         ({"watched_capsules": ("tail",)}, "watched"),
         ({"joints": "shoulder_pan"}, "must be a list"),
@@ -160,4 +160,4 @@ def test_looks_that_no_capsule_holds_are_told(servoed, sticks_out):
         warnings.simplefilter("always")
         warn_of_mismatch(replace(servoed, mjcf=spec.to_xml()))
     assert bool(told) == sticks_out
-    assert all("out of all capsules" in str(each.message) for each in told)
+    assert all("beyond all capsules" in str(each.message) for each in told)

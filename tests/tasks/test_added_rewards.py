@@ -52,7 +52,7 @@ def test_a_task_with_a_term_more_goes_to_other_processes():
         ("HRCReach-v0", (calm,), "must be a RewardTerm, got function"),
         ("HRCReach-v0", (CALM, CALM), "has a term 'calm' already"),
         ("HRCReach-v0", (hrc_env.RewardTerm("goal", "", calm),), "has a term 'goal' already"),
-        ("HRCReach-v0", (hrc_env.RewardTerm("effort", "", calm),), "has a term 'effort' already"),
+        ("HRCReach-v0", (hrc_env.RewardTerm("effort", "", calm),), "already has a term 'effort'"),
     ],
 )
 def test_what_cannot_be_added_is_refused_in_words(task, terms, said):

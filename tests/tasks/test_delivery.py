@@ -253,8 +253,8 @@ def _walks(simulation) -> bool:
         ({"scene": "lab"}, 'two zones .* Valid is scene="site"'),
         ({"control": "tool"}, 'valid is control="joint"'),
         ({"control": "twist"}, 'valid is control="joint"'),
-        ({"robot": "ur10e_like"}, "a robot that drives, and 'ur10e_like' .* 'mobile_base'"),
-        ({"config": {"task": {"way_m": (30.0, 40.0)}}}, "a way of 30 to 40 m"),
+        ({"robot": "ur10e_like"}, "a mobile robot, which 'ur10e_like' .* 'mobile_base'"),
+        ({"config": {"task": {"way_m": (30.0, 40.0)}}}, "a path of 30 to 40 m"),
         ({"config": {"task": {"way_m": (8.0, 4.0)}}}, r"\(low, high\)"),
         ({"config": {"task": {"reward": "some"}}}, '"dense" or "sparse"'),
         ({"config": {"task": {"zone_m": 0.0}}}, "zone_m"),
@@ -266,7 +266,7 @@ def test_what_does_not_fit_is_said(arguments, said):
 
 
 def test_an_arms_task_wants_an_arm():
-    with pytest.raises(ConfigError, match="an arm on the pedestal, and 'mobile_base'"):
+    with pytest.raises(ConfigError, match="an arm on the pedestal, which 'mobile_base'"):
         gymnasium.make("HRCReach-v0", perception="truth", robot="mobile_base")
 
 

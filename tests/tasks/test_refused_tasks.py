@@ -73,7 +73,7 @@ REFUSED = {
         for name in (*REQUIRED, "markers", "is_terminal")
     },
     "a former name": (vary(REACH, over=lambda self, step: True), "over is called is_terminal now"),
-    "nearly a hook": (vary(REACH, is_terminl=lambda self, step: True), "Is is_terminal meant"),
+    "nearly a hook": (vary(REACH, is_terminl=lambda self, step: True), "Did you mean is_terminal"),
     "other arguments": (vary(REACH, view=lambda self, state: None), "view must be a method of"),
     "an object of a task": (REACH(), "register the class Reach itself"),
     "terms in a list": (vary(REACH, rewards=[]), "rewards must be a tuple of RewardTerm"),
@@ -83,10 +83,10 @@ REFUSED = {
         vary(REACH, config_type=make_dataclass("Own", ["x"])), "needs a default"),
     "an observation twice": (
         vary(REACH, observations=(*REACH.observations, SHARED_TERMS[0])),
-        f"term {SHARED_TERMS[0].name!r} already"),
+        f"term {SHARED_TERMS[0].name!r} exists already"),
     "a reward twice": (
         vary(REACH, rewards=(*REACH.rewards, SHARED_REWARDS[-1])),
-        f"term {SHARED_REWARDS[-1].name!r} already"),
+        f"term {SHARED_REWARDS[-1].name!r} exists already"),
     "another goal": (
         vary(WITH_GOAL, goal=SimpleNamespace(doc="near")), "goal must be a Goal, got Simple"),
     "a state that is a list": (
@@ -230,7 +230,7 @@ def test_a_place_for_deliveries_has_one_way_that_is_as_long_as_is_asked():
         (longest + tiny, longest + 1.0), (0.5 * shortest, shortest - tiny),
         (below + tiny, above - tiny),
     ):  # fmt: skip
-        said = rf"here are {len(lengths)} zones, and the longest way is {longest:.1f} m"
+        said = rf"has {len(lengths)} zones, and its longest path is {longest:.1f} m"
         with pytest.raises(ConfigError, match=said):
             Delivery(DeliveryConfig(way_m=refused)).survey(grounds)
 
@@ -247,5 +247,5 @@ def test_ways_between_zones_are_those_that_are_looked_up_there():
 def test_a_place_without_zones_has_no_ways():
     grounds = build(name="site", robot="mobile_base").map
     full = replace(grounds, blocked=np.array([[0.0, 0.0, 99.0, 99.0, 0.0]]))
-    with pytest.raises(ConfigError, match=r"here are 0 zones, and the longest way is 0\.0 m"):
+    with pytest.raises(ConfigError, match=r"has 0 zones, and its longest path is 0\.0 m"):
         Delivery().survey(full)

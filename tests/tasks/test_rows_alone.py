@@ -68,17 +68,17 @@ def goal(reward):
 
 
 WRONG = {
-    "one generator": (vary(REACH, reset=first_generator), "beside others than alone"),
+    "one generator": (vary(REACH, reset=first_generator), "differs between a batch and a single"),
     "a mean": (
         vary(REACH, rewards=(term(lambda now, *_: np.full(len(now.action), now.robot.q.mean())),)),
-        "the reward of an environment is another one beside others|'reward/own'"),
+        "the reward of an environment differs between a batch|'reward/own'"),
     "all rows": (vary(REACH, view=all_rows), "rows|environments"),
-    "the first rows": (vary(REACH, view=first_rows), "is another one beside others than alone"),
-    "a reset of all": (vary(REACH, reset=everybody), "is another one beside others than alone"),
-    "a count in itself": (Counting, "All that changes must be in the state"),
-    "luck": (Lucky, "all chance in rngs"),
+    "the first rows": (vary(REACH, view=first_rows), "differs between a batch and a single"),
+    "a reset of all": (vary(REACH, reset=everybody), "differs between a batch and a single"),
+    "a count in itself": (Counting, "Everything that changes must be in the state"),
+    "luck": (Lucky, "all random numbers must come from rngs"),
     "the wrong axis": (goal(nearby), r"Goal\.reward must take"),
-    "a mean of goals": (goal(average), "judge each pair for itself"),
+    "a mean of goals": (goal(average), "evaluate each pair independently"),
     "no steps": (vary(REACH, max_episode_steps=0), "max_episode_steps must be"),
     "half a step": (vary(REACH, max_episode_steps=2.5), "max_episode_steps must be"),
 }  # fmt: skip

@@ -53,10 +53,10 @@ class Moving(Own):
 @pytest.mark.parametrize(
     ("made", "said"),
     [
-        (OneGenerator, "beside others than alone"),
-        (Mean, "beside others than alone"),
-        (Hidden, "keep all that changes in the state"),
-        (Moving, "keep all that changes in the state|estimate must change nothing"),
+        (OneGenerator, "in a batch as alone"),
+        (Mean, "in a batch as alone"),
+        (Hidden, "keep everything that changes in the state"),
+        (Moving, "keep everything that changes in the state|estimate must change nothing"),
     ],
 )
 def test_an_estimator_whose_environments_depend_on_others_is_refused(made, said):

@@ -130,7 +130,7 @@ def test_cameras_on_one_wall_leave_the_depth_of_the_place_to_the_prior():
     "initial_bounds_m", [((0, 1), (0, 1)), ((0, 1), (0, 1), (2, 2)), (1, 2, 3)]
 )
 def test_a_place_that_is_none_is_refused(initial_bounds_m):
-    with pytest.raises(ConfigError, match="initial_bounds_m must be empty or hold the least"):
+    with pytest.raises(ConfigError, match="initial_bounds_m must be empty or contain the minimum"):
         PaperConfig(initial_bounds_m=initial_bounds_m)
 
 

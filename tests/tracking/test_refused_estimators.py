@@ -98,7 +98,7 @@ def without(name: str) -> Callable[..., Any]:
 
 
 WRONG = {
-    "of another kind": ({}, "must give a PoseEstimate, got dict"),
+    "of another kind": ({}, "must return a PoseEstimate, got dict"),
     "less": (believed(mean_world=np.zeros((3, 2, 15, 2))), "mean_world must have shape"),
     "a covariance a number": (believed(cov_world=np.ones((3, 2, 15, 3))), "cov_world must have"),
     "a velocity a worker": (believed(velocity_world=np.ones((3, 2, 3))), "velocity_world must"),
@@ -133,8 +133,8 @@ def test_a_belief_in_which_one_thing_is_wrong_is_refused(name, when):
     ("spec", "said"),
     [
         ("particle", "must be an EstimatorSpec, got str"),
-        (spec_of(config=dict), "must be a kind of TrackerConfig"),
-        (spec_of(config=TrackerConfig()), "must be a kind of TrackerConfig"),
+        (spec_of(config=dict), "must be a subclass of TrackerConfig"),
+        (spec_of(config=TrackerConfig()), "must be a subclass of TrackerConfig"),
         (spec_of(needs_pairs="no"), "told: needs_pairs must be a bool, got str 'no'"),
         (spec_of(handles_late_frames=None), "told: handles_late_frames must be a bool, got None"),
         *(
@@ -199,7 +199,7 @@ def test_an_estimator_is_called_by_its_name_itself_or_what_makes_it():
         assert find_estimator(spec) is spec
     made = find_estimator(Told)
     assert (made.name, made.make) == ("Told", Told)
-    for name, said in (("smoother", "needs the future"), ("partikel", "Unknown estimator")):
+    for name, said in (("smoother", "is an offline method"), ("partikel", "Unknown estimator")):
         with pytest.raises(ConfigError, match=said):
             find_estimator(name)
 
@@ -213,7 +213,9 @@ def test_a_clip_needs_a_time_between_its_frames(taken, dt_s):
     if taken:
         assert smooth(LAB, clip, dt_s).tracked.shape == (1, 1, 1)
         return
-    with pytest.raises(ConfigError, match="a clip needs frames and a positive dt_s, got 1"):
+    with pytest.raises(
+        ConfigError, match="a clip must have frames, and dt_s must be positive, got 1"
+    ):
         smooth(LAB, clip, dt_s)
 
 

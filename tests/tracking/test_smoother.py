@@ -155,10 +155,10 @@ def test_nobody_and_nothing_are_data():
     assert smoothed.mean_world.shape == (3, 2, 1, 15, 3)
     assert not smoothed.tracked.any()
     assert np.linalg.eigvalsh(smoothed.cov_world).min() > 0
-    with pytest.raises(ConfigError, match="a clip needs frames"):
+    with pytest.raises(ConfigError, match="a clip must have frames"):
         smooth(LAB, [], DT)
 
 
 def test_asked_for_as_an_estimator_it_says_that_it_needs_the_future():
-    with pytest.raises(ConfigError, match=r"needs the future.*tracking\.smoother\.smooth"):
+    with pytest.raises(ConfigError, match=r"is an offline method.*tracking\.smoother\.smooth"):
         make_estimator("smoother", LAB, DT)

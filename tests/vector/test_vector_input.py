@@ -86,7 +86,7 @@ def test_bad_seeds(env, seed, said):
         (np.ones(3, bool), r"shape \(2,\)"),
         (np.ones(2), "array of bool"),
         ([True, False], "array of bool"),
-        (np.zeros(2, bool), "True somewhere"),
+        (np.zeros(2, bool), "True for at least one"),
     ],
 )
 def test_bad_reset_masks(env, mask, said):
@@ -107,10 +107,10 @@ def test_the_order_of_calls():
         env.reset(options={"reset_mask": np.array([True, False])})
     env.reset(seed=0)
     env.step(np.zeros((2, 6)))
-    with pytest.raises(ConfigError, match=r"environments \[0, 1\] are over.*reset_mask"):
+    with pytest.raises(ConfigError, match=r"environments \[0, 1\] have ended.*reset_mask"):
         env.step(np.zeros((2, 6)))
     env.reset(options={"reset_mask": np.array([True, False])})
-    with pytest.raises(ConfigError, match=r"environments \[1\] are over"):
+    with pytest.raises(ConfigError, match=r"environments \[1\] have ended"):
         env.step(np.zeros((2, 6)))
     env.close()
     for call in (env.reset, env.render, lambda: env.step(np.zeros((2, 6)))):
@@ -155,4 +155,6 @@ def test_a_failure_says_how_its_environments_are_counted(monkeypatch):
     monkeypatch.setattr(env.shards.parts[1], "step", breaks_down)
     with pytest.raises(HRCError, match="environment 0") as failure:
         env.step(np.zeros((4, 6)))
-    assert failure.value.__notes__ == ["Environments are counted from number 2 of the vector here."]
+    assert failure.value.__notes__ == [
+        "Here, environments are counted from number 2 of the vector."
+    ]

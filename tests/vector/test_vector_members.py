@@ -71,11 +71,11 @@ def test_calls_and_attributes_are_those_of_single_environments():
     for (seen, info), (expected, told) in zip(mine, other, strict=True):
         np.testing.assert_array_equal(seen, expected)
         assert info == told
-    with pytest.raises(ConfigError, match="one an environment"):
+    with pytest.raises(ConfigError, match="one entry per environment"):
         ours.set_attr("tag", [1, 2])
-    with pytest.raises(ConfigError, match=r"settings when they are made"):
+    with pytest.raises(ConfigError, match=r"settings are fixed at creation"):
         ours.set_attr("config", None)
-    with pytest.raises(ConfigError, match=r"Unknown attribute of one environment"):
+    with pytest.raises(ConfigError, match=r"Unknown attribute of a single environment"):
         ours.get_attr("max_episode_step")
     ours.call("close")
     assert ours.closed

@@ -58,9 +58,9 @@ def test_options_that_cannot_work_say_so():
         ({"elapsed_steps": np.array([0.5, 1, 2])}, "whole numbers"),
         ({"steps_left": 0}, "from 1 to"),
         ({"steps_left": np.array([1.5, 1, 1])}, "whole numbers"),
-        ({"steps_left": 1, "elapsed_steps": np.array([0, 0, 0])}, "give one of them"),
+        ({"steps_left": 1, "elapsed_steps": np.array([0, 0, 0])}, "give only one of them"),
         ({"reset_mask": [True, True, True]}, "NumPy array of bool"),
-        ({"reset_mask": np.zeros(3, bool)}, "True somewhere"),
+        ({"reset_mask": np.zeros(3, bool)}, "True for at least one"),
     )
     for options, said in bad:
         with pytest.raises(ConfigError, match=said):

@@ -163,11 +163,11 @@ def report(metrics: Metrics) -> Report:
     ]
     times = [format_number(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
     header = ["RMSE in cm", *names()]
-    return Report("Other people's code on the same sequences", describe_missing(), [
+    return Report("Other libraries on the same sequences", describe_missing(), [
         format_table(header, [*lines, ["us per update of a worker", *times]]),
-        "aniposelib is offline: it sees the whole clip at once, frames to come included; its time "
-        "is the clip's over its frames. Low and high in results.json are the best and the worst "
-        "sequence.",
+        "aniposelib is offline: it uses the whole clip, including future frames; its time is that "
+        "of the clip divided by its number of frames. Low and high in results.json are the best "
+        "and the worst sequence.",
     ], "the best and the worst sequence")  # fmt: skip
 
 
@@ -180,4 +180,7 @@ def describe_missing() -> str:
     """Return a sentence that lists the missing libraries and explains their installation."""
     if not list_missing():
         return "All libraries are installed."
-    return f"Not installed, so not run: {', '.join(list_missing())}. Get them with: {INSTALL}"
+    return (
+        f"Not installed and therefore skipped: {', '.join(list_missing())}. Install them with: "
+        f"{INSTALL}"
+    )

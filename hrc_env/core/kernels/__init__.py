@@ -81,8 +81,8 @@ def dispatcher(version: str) -> Any:
     tested = version.startswith(tuple(f"{release}." for release in LEAN_WITH))
     if not tested:
         warnings.warn(
-            f"{UNTESTED} {version}, but with {', '.join(LEAN_WITH)}: numba's own compiler is used, "
-            "which takes about twice as long, once.",
+            f"{UNTESTED} {version}, but with {', '.join(LEAN_WITH)}: numba's default compiler is "
+            "used, which makes the first compilation about twice as slow.",
             stacklevel=2,
         )
     name = "lean" if tested else "plain"

@@ -46,7 +46,7 @@ def compile_missing(level: str | None, say: Say) -> int:
 
     Kernels are compiled on their first call instead if a process cannot be started or dies.
     """
-    with alone(folder(), lambda: say(0.0, "waiting for another program that compiles")):
+    with alone(folder(), lambda: say(0.0, "waiting for another process that compiles the kernels")):
         todo = missing(level)
         wanted, total_s = iter(todo), sum(each.seconds for each in todo)
         with ThreadPoolExecutor(n_cores()) as threads:
@@ -67,14 +67,17 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
     try:
         process: Any = subprocess.Popen(command, **pipes)
     except OSError as error:
-        log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
+        log.warning(
+            "Kernels cannot be compiled in advance (%s); each is compiled when it is first called.",
+            error,
+        )
         return
     for each in wanted:
         with contextlib.suppress(OSError):  # raised for a process that has died
             process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
         answer = process.stdout.readline()
         if answer != "done\n":
-            log.warning("Compiling %s failed; it is tried when called.", each.kernel)
+            log.warning("Compiling %s failed; it is compiled when it is first called.", each.kernel)
         if not answer:
             break
         say(each.seconds / total_s, each.kernel.partition(":")[2])
@@ -86,7 +89,9 @@ def _logged() -> Say:
     """Return a callback that writes the progress to the log."""
     began_s = said_s = time.monotonic()
     done = 0.0
-    log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
+    log.warning(
+        "Compiling the kernels of hrc_env for this machine, only once (a minute or two) ..."
+    )
 
     def say(share: float, _: str) -> None:
         nonlocal done, said_s

@@ -90,7 +90,7 @@ def encode(kind: Any) -> Any:
     elif isinstance(kind, types.BaseTuple):
         text = inside
     if decode(text) != kind:
-        raise TypeError(f"signatures.encode knows no {type(kind).__name__}: {kind}.")
+        raise TypeError(f"signatures.encode does not support {type(kind).__name__}: {kind}.")
     return text
 
 
@@ -120,4 +120,6 @@ def _name_of(record: types.Record) -> str:
         for name, value in vars(sys.modules[module]).items():
             if isinstance(value, np.dtype) and value == dtype and value.names == dtype.names:
                 return f"{module}:{name}"
-    raise TypeError(f"{dtype} is no constant of a module of hrc_env: give its dtype a name there.")
+    raise TypeError(
+        f"{dtype} is not a constant of a module of hrc_env: define its dtype as a named constant."
+    )

@@ -58,7 +58,7 @@ class Ablations:
                 f"Episodes must be longer than the warm-up of {WARM_UP_S:g} s, got {self.seconds}."
             )
         if not self.studies:
-            raise ConfigError(f"--studies needs a name of {', '.join(ABLATIONS)}.")
+            raise ConfigError(f"--studies requires at least one of {', '.join(ABLATIONS)}.")
         check_names("study", self.studies, ABLATIONS)
 
     @property

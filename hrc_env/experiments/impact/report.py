@@ -60,9 +60,9 @@ def make_report(
         policies.remove(PPO)
         reached = metrics[f"{PPO}.{REFERENCE}.goals_per_min"].value
         question.append(
-            f"`{PPO}` did not learn its task ({reached:.1f} goals a minute with the reference), so "
-            "its rows do not show the effect of perception: it is left out here, and its numbers "
-            "are in results.json only."
+            f"`{PPO}` did not learn its task ({reached:.1f} goals per minute with the reference), "
+            "so its rows do not show the effect of perception: it is left out here, and its "
+            "numbers are in results.json only."
         )
     title = f"{TITLE}{', a quick run' if warning else ''}"
     if not policies:

@@ -109,7 +109,7 @@ def make_price_table(
         f"Goals that {robot} reaches beside workers of one body who ignore it, with emulated "
         f"detections and the `{SHIELD}` shield. Each setup has the margin with which the robot "
         f"touches a worker while moving towards them {level:g} times in 1,000 episodes of 10 s, "
-        f"that is {count_per_hour(level):.1f} times an hour; other contacts are not equalized. "
+        f"that is {count_per_hour(level):.1f} times per hour; other contacts are not equalized. "
         "The margin is added to all protective distances; 0 is the default shield, and negative "
         f"margins let the robot come closer. It is found on {n_seeds} episodes and corrected by "
         f"{{n[{task}.{eyes[0].name}.margin_m]}} others, which are played with the tested margin. "

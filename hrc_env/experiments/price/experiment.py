@@ -95,7 +95,7 @@ class Price:
         find_eyes(self.eyes)
         if not self.eyes:
             raise ConfigError(
-                f"No perception setup to compare; there are {', '.join(list_default_eyes())}."
+                f"No perception setup to compare; valid are {', '.join(list_default_eyes())}."
             )
         low, high = self.bracket_m
         if not (low < high and self.level > 0):
@@ -208,8 +208,8 @@ def _check_task(task: str, agent: str) -> None:
     find_task(task)
     if agent == SCRIPTED and task not in EXPERTS:
         raise ConfigError(
-            f"The study needs a scripted robot, and there is none for {task}; there is one for "
-            f"{', '.join(EXPERTS)}. Or name your own agent: --robots MODULE:FUNCTION."
+            f"The study needs a scripted robot, which exists only for {', '.join(EXPERTS)}, not "
+            f"for {task}. Otherwise, name a custom agent: --robots MODULE:FUNCTION."
         )
 
 
@@ -230,8 +230,8 @@ def make_experiment(
     """
     if len(robots) > 1:
         raise ConfigError(
-            f"The study is of one robot, got --robots {' '.join(robots)}. Run it once for each, "
-            "with its own folder (--out)."
+            "The study compares perception setups for a single robot, got --robots "
+            f"{' '.join(robots)}. Run it separately for each robot, with different folders (--out)."
         )
     driver = Driver(*robots or (SCRIPTED,), control=control, trust=trust)
     others = () if robots else tuple(each for each in BUILT_IN if each != DEFAULT)
@@ -371,6 +371,6 @@ def check_walks(task: str, alone: Rows, row: Row) -> None:
     """Raise `HRCError` if the workers' motion differs from that in episodes without a shield."""
     if find_task(task).signal is Task.signal and row.fresh["walk"] != alone["walk"]:
         raise HRCError(
-            f"In {task} workers moved differently than beside other robots, so rows cannot be "
+            f"In {task} workers moved differently than near other robots, so rows cannot be "
             "compared. Delete the folder's parts and start again."
         )

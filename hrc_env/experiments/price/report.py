@@ -75,12 +75,12 @@ def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) ->
         if row.ends_at(margins_m[name]) and abs(row.margin_m - margins_m[name]) > 1e-6
     ]
     note = (
-        f" Fresh seeds of {', '.join(unsure)} were played with that margin, where the search "
-        "placed the level; they contradict it, and are too few to place it."
+        f" For {', '.join(unsure)}, fresh seeds with the margin that the search found contradict "
+        "it, but are too few to determine it."
     )
     return (
-        f"The level lies beyond the margins that were tried for {', '.join(beyond)}: their margin "
-        f"is the last one tried, and their throughput a bound.{note if unsure else ''}"
+        f"For {', '.join(beyond)}, the level was not reached within the tested margins: the margin "
+        f"is the last one tested, and the throughput is a bound.{note if unsure else ''}"
     )
 
 

@@ -65,7 +65,7 @@ class Site:
         """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
-            raise ConfigError(f"--estimator needs a name of {', '.join(KNOWN)}.")
+            raise ConfigError(f"--estimator requires at least one of {', '.join(KNOWN)}.")
         check_names("estimator", self.estimators, KNOWN)
 
     @property

@@ -52,8 +52,8 @@ class NoRoomError(ConfigError):
     def __init__(self, clip: Clip) -> None:
         """Create an error that names the clip."""
         super().__init__(
-            f"{clip.source}: there is no room for {SHORTEST_S} s or more of this clip from any "
-            "place where workers finish a job."
+            f"{clip.source}: there is no room for {SHORTEST_S} s or more of this clip at any "
+            "position where workers finish a job."
         )
         self.clip = clip
 
@@ -215,8 +215,8 @@ def _find_stands(clip: Clip) -> Ints:
         return stands
     raise ConfigError(
         f"{clip.source}: both feet are within {100 * LOW_M:g} cm of the floor at {len(stands)} "
-        f"frames within {SHORTEST_S} s only; a clip is played from one such moment to another. "
-        "Record them, too, at the beginning and the end."
+        f"frames within {SHORTEST_S} s only; a clip is played from one such frame to another. "
+        "Record such poses at the beginning and the end."
     )
 
 

@@ -38,34 +38,52 @@ class Kind(NamedTuple):
 
 KINDS: dict[str, Kind] = {
     "lost": Kind(TIMING, "-", 0.0, (0.0, 0.0), "no images"),
-    "frozen": Kind(TIMING, "-", 0.0, (0.0, 0.0), "the last image again and again, as if new"),
-    "late": Kind(TIMING, "s", 0.2, (0.0, 1.0), "images come later, with their true times"),
-    "dropped": Kind(TIMING, "share", 0.3, (0.0, 1.0), "this share of images is missing, at random"),
+    "frozen": Kind(TIMING, "-", 0.0, (0.0, 0.0), "the last image is repeated as if it were new"),
+    "late": Kind(TIMING, "s", 0.2, (0.0, 1.0), "images arrive late, with correct time stamps"),
+    "dropped": Kind(
+        TIMING, "share", 0.3, (0.0, 1.0), "a random share of images, of this size, is missing"
+    ),
     "out_of_step": Kind(
-        TIMING, "control steps", 2.0, (0.0, 25.0), "images are this old, but claim to be new"
+        TIMING,
+        "control steps",
+        2.0,
+        (0.0, 25.0),
+        "images are older by this time, but have current time stamps",
     ),
     "wrong_rotation": Kind(
-        PLACE, "rad", 0.02, (0.0, 0.5), "the camera is rotated from its calibrated pose"
+        PLACE, "rad", 0.02, (0.0, 0.5), "the camera is rotated relative to its calibrated pose"
     ),
     "wrong_translation": Kind(
-        PLACE, "m", 0.05, (0.0, 1.0), "the camera is shifted from its calibrated pose"
+        PLACE, "m", 0.05, (0.0, 1.0), "the camera is displaced relative to its calibrated pose"
     ),
     "wrong_focal": Kind(
         PLACE, "share", 0.03, (-0.5, 0.5), "the focal length is longer than calibrated"
     ),
-    "knocked": Kind(PLACE, "rad", 0.1, (0.0, 1.0), "the camera has been rotated by a knock"),
-    "motion_blur": Kind(IMAGE, "s", 0.04, (0.0, 0.1), "the shutter is open for this time"),
-    "defocus": Kind(IMAGE, "px", 8.0, (0.0, 60.0), "points are discs of this radius"),
-    "noise": Kind(IMAGE, "grey levels", 20.0, (0.0, 100.0), "standard deviation of each pixel"),
+    "knocked": Kind(PLACE, "rad", 0.1, (0.0, 1.0), "the camera is rotated by an impact"),
+    "motion_blur": Kind(IMAGE, "s", 0.04, (0.0, 0.1), "motion blur of this exposure time"),
+    "defocus": Kind(IMAGE, "px", 8.0, (0.0, 60.0), "points are blurred to discs of this radius"),
+    "noise": Kind(
+        IMAGE,
+        "grey levels",
+        20.0,
+        (0.0, 100.0),
+        "noise of this standard deviation is added to each pixel",
+    ),
     "dirt": Kind(
-        IMAGE, "share", 0.15, (0.0, 0.9), "spots on the lens hide this share of the image"
+        IMAGE, "share", 0.15, (0.0, 0.9), "spots of dirt on the lens cover this share of the image"
     ),
-    "white_balance": Kind(IMAGE, "share", 0.4, (-0.9, 0.9), "more red and less blue"),
-    "exposure": Kind(IMAGE, "stops", 2.0, (-6.0, 6.0), "the image is brighter"),
+    "white_balance": Kind(IMAGE, "share", 0.4, (-0.9, 0.9), "the image has more red and less blue"),
+    "exposure": Kind(
+        IMAGE, "stops", 2.0, (-6.0, 6.0), "the image is brighter by this number of stops"
+    ),
     "darkness": Kind(
-        IMAGE, "share", 0.05, (0.001, 1.0), "this share of the light is left, and noise"
+        IMAGE,
+        "share",
+        0.05,
+        (0.001, 1.0),
+        "only this share of the light remains, and noise is added",
     ),
-    "glare": Kind(IMAGE, "share", 0.8, (0.0, 1.0), "a light shines into the lens"),
+    "glare": Kind(IMAGE, "share", 0.8, (0.0, 1.0), "a light source shines into the lens"),
 }
 """All kinds of faults, by name."""
 ALL = "all"
@@ -102,8 +120,8 @@ class FaultConfig:
         named = isinstance(self.cameras, tuple) and all(map(_is_choice, self.cameras))
         if not named or not self.cameras:
             raise ConfigError(
-                f"Fault {self.kind!r} must name its cameras, as ('camera_1',), (0,) or ('all',), "
-                f"got {self.cameras!r}."
+                f"Fault {self.kind!r} must name its cameras, such as ('camera_1',), (0,) or "
+                f"('all',), got {self.cameras!r}."
             )
         low, high = KINDS[self.kind].bounds
         ends = self.amount if isinstance(self.amount, tuple | list) else (self.max_amount,)
@@ -116,13 +134,13 @@ class FaultConfig:
             len(ends) == 2 and isinstance(self.amount, tuple) and ends[0] <= ends[1]
         ):
             raise ConfigError(
-                f"Fault {self.kind!r}: a range of amounts must be (least, most), from which every "
-                f"episode's amount is drawn, got {self.amount!r}."
+                f"Fault {self.kind!r}: a range of amounts must be (least, most), from which the "
+                f"amount is drawn in every episode, got {self.amount!r}."
             )
         if not 0 <= self.start_s < self.end_s:
             raise ConfigError(
-                f"Fault {self.kind!r} must begin at 0 s or later and end after that, "
-                f"got from {self.start_s} to {self.end_s} s."
+                f"Fault {self.kind!r} must begin at 0 s or later and end after its beginning, got "
+                f"{self.start_s} to {self.end_s} s."
             )
 
     @property

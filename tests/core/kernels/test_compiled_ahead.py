@@ -61,7 +61,7 @@ def test_where_no_process_can_be_started_it_says_so_and_goes_on(two_kernels, mon
     monkeypatch.setattr(sys, "executable", "/nonexistent/python")
     with caplog.at_level(logging.WARNING):
         ahead.compile_missing(None, lambda share, what: None)
-    assert "cannot be compiled ahead" in caplog.text
+    assert "cannot be compiled in advance" in caplog.text
     assert ahead.missing() == two_kernels
 
 

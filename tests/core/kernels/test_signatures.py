@@ -44,7 +44,7 @@ def test_a_structured_array_is_recorded_by_the_name_of_its_dtype(monkeypatch):
 
 
 def test_a_dtype_without_a_name_is_refused():
-    with pytest.raises(TypeError, match="give its dtype a name"):
+    with pytest.raises(TypeError, match="define its dtype as a named constant"):
         signatures.encode(typeof(np.zeros(1, [("a_dtype_of_nobody", "f8")])))
 
 

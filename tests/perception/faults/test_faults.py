@@ -211,7 +211,7 @@ def test_faults_are_a_list(faults):
 
 
 def test_faults_without_cameras_are_refused():
-    with pytest.raises(ConfigError, match="Faults are of cameras"):
+    with pytest.raises(ConfigError, match="Faults need cameras"):
         HRCEnv(perception="truth", faults=[FaultConfig("lost", ("all",))])
 
 

@@ -80,9 +80,10 @@ def _select_corners(rigs: tuple[Rig, ...]) -> tuple[Turn, ...]:
 CAMERAS = Ablation(
     "cameras",
     "How many cameras, and where?",
-    "Cameras of 90 degrees in some of eight places round the laboratory (corners, middles of "
+    "Cameras of 90 degrees at some of eight positions around the laboratory (corners, middles of "
     "walls), 2.45 m high unless stated otherwise; episodes rotate over the choices. One camera is "
-    "one that remains of four after the warm-up, and so are fewer than four masts of the site.",
+    "one that remains of four after the warm-up; the same applies to fewer than four masts of the "
+    "site.",
     (
         *(
             Setting(f"n{n}", f"{n} of eight places around the room", turns=spread_cameras(n))
