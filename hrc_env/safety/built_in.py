@@ -239,7 +239,10 @@ def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -
 def scale_velocities(
     constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
 ) -> None:
-    """Scale the velocities of all joints by one factor so that every constraint is satisfied.
+    """Scale the velocities of all joints by the largest factor that the constraints permit.
+
+    The factor is in [0, 1]. If a constraint J v <= b has b <= 0 and the motion has J v > 0, it is
+    0: the robot stops, and the constraint may stay violated.
 
     Args:
         constraints: constraints of every robot.

@@ -224,7 +224,8 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
 
     Returns:
         New arrays with the shapes of `now`: means [m], velocities [m/s] and covariances [m^2] at
-        that time, and ages increased by the horizon. Tracked workers stay tracked.
+        that time, and ages increased by the horizon, up to `max_age_s`. Tracked workers stay
+        tracked.
 
     Raises:
         ConfigError: `horizon_s` is not in (0, 1].

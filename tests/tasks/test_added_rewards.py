@@ -50,8 +50,8 @@ def test_a_task_with_a_term_more_goes_to_other_processes():
         ("HRCReech-v0", (CALM,), "Did you mean 'HRCReach-v0'"),
         ("HRCReach-v0", (), "at least one RewardTerm"),
         ("HRCReach-v0", (calm,), "must be a RewardTerm, got function"),
-        ("HRCReach-v0", (CALM, CALM), "has a term 'calm' already"),
-        ("HRCReach-v0", (hrc_env.RewardTerm("goal", "", calm),), "has a term 'goal' already"),
+        ("HRCReach-v0", (CALM, CALM), "already has a term 'calm'"),
+        ("HRCReach-v0", (hrc_env.RewardTerm("goal", "", calm),), "already has a term 'goal'"),
         ("HRCReach-v0", (hrc_env.RewardTerm("effort", "", calm),), "already has a term 'effort'"),
     ],
 )

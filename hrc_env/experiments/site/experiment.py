@@ -37,8 +37,8 @@ SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
 """Configuration with a wide prior, because walks lead far away from the centre of the
 workplaces."""
 ALONE = "alone."
-"""Prefix of results in which only the row's cameras are used from the first frame on, as in the
-paper."""
+"""Prefix of the names of results that use only the cameras of their table row from the first frame
+on, as in the paper."""
 ROWS = tuple(CHOICES)
 """Names of the rigs: each camera alone, and all four."""
 
