@@ -111,18 +111,20 @@ class ParticleEstimator:
             state: the hypotheses, of which the heaviest (index 0 of axis H) is read.
             estimate: (B, W, ...) estimate, changed in place.
         """
-        heaviest, views = state.trees[:, :, 0], state.views[:, :, 0]  # (B, W) and (B, W, C)
+        trees, views = state.trees, state.views  # (B, W, H) and (B, W, H, C)
         # (B, W) relative error of body size and distance; 0 once two cameras agree
-        size_std = np.where(estimate.tracked, heaviest["size_std"], 0.0)
-        is_misaligned = estimate.tracked & heaviest["pair"]["is_misaligned"]  # (B, W)
+        size_std = np.where(estimate.tracked, trees["size_std"][:, :, 0], 0.0)
+        is_misaligned = estimate.tracked & trees["pair"]["is_misaligned"][:, :, 0]  # (B, W)
         if not (size_std.any() or is_misaligned.any()):
             return estimate
 
-        displacement_cov = heaviest["displaced_m2"][is_misaligned]  # (n, 3, 3) for n such workers
+        # (n, 3, 3) for the n workers with misaligned cameras
+        displacement_cov = trees["displaced_m2"][:, :, 0][is_misaligned]
         estimate.cov_world[is_misaligned] += displacement_cov[:, None]  # the same for all J joints
 
         camera_centres = -np.linalg.solve(self.P[:, :, :3], self.P[:, :, 3:])[..., 0]  # (C, 3)
-        last_camera = views["unseen_updates"].argmin(-1)  # (B, W) camera that saw the worker last
+        # (B, W) camera that saw the worker last
+        last_camera = views["unseen_updates"][:, :, 0].argmin(-1)
         rays = estimate.mean_world - camera_centres[last_camera][:, :, None]  # (B, W, J, 3)
         radial_std = size_std[..., None, None] * rays  # (B, W, J, 3) vector of length one sigma
         estimate.cov_world[...] += radial_std[..., :, None] * radial_std[..., None, :]

@@ -383,8 +383,8 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
     stationary = np.zeros_like(F)  # (J, 2, 2) stationary covariances, F S F' + Q = S
     stationary[:, 0, 0] = SPREAD_M**2
     stationary[:, 1, 1] = SPEED_M_S**2
-    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
-    Q += make_shared_noise(dt_s, root_acceleration)
+    shared_noise = make_shared_noise(dt_s, root_acceleration)
+    Q = stationary - F @ stationary @ F.swapaxes(1, 2) + shared_noise
     return JointMotion(F, Q)
 
 
