@@ -33,8 +33,11 @@ class CostConfig:
     """Settings of the cost: unsafe events, and whether a contact ends the episode."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """Names of the components that are added up, from `COMPONENTS`. With the default ones, the cost
-    is a number of control steps."""
+    """Components that are added up: "proximity", 1 for a step nearer than `proximity_m`; "contact",
+    1 for a step with a contact; "towards", contacts that begin while the robot moves towards the
+    worker; "force", forces of contacts relative to the permitted ones; "separation_violated", 1 for
+    a step within the protective distance while approaching; "near_miss". With the default
+    components, the cost is a number of control steps."""
     proximity_m: float = 0.15
     """True separation between surfaces below which a step costs 1 [m]."""
     contact_terminates: bool = False
