@@ -291,6 +291,21 @@ def test_options_that_a_page_names_exist(page):
         assert {*re.findall(r" (--[a-z-]+)", line)} <= {*known, "--import"}, (command, line)
 
 
+PYTHONS_OWN = ("An attempt has been made to start a new process",)
+"""Errors of other programs that the page on problems quotes."""
+
+
+def test_errors_that_the_page_on_problems_quotes_are_raised():
+    files = [*(ROOT / "hrc_env").rglob("*.py"), *(ROOT / "agents").rglob("*.py")]
+    source = "".join(re.sub(r'"\s*\n\s*f?"', "", path.read_text()) for path in files)
+    page = (ROOT / "docs" / "troubleshooting.md").read_text()
+    quotes = re.findall(r"^\*\*`([^`]+)`", page, re.M)
+    parts = [part.strip(" :;") for quote in quotes for part in quote.split("...")]
+    long = [part for part in parts if len(part) > 10 and part not in PYTHONS_OWN]
+    assert len(long) > 5
+    assert [part for part in long if part not in source] == []
+
+
 UNIT = (
     r"(?:(?:mm|cm|m|km|s|ms|us|min|h|px|Hz|rad|kB|MB|GB|degrees?|times|steps|frames|images|resets"
     r"|episodes|goals|contacts|seconds|minutes|hours)\b|%)"

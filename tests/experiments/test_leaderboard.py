@@ -72,7 +72,7 @@ def test_entries_are_written_and_read(tmp_path):
     with pytest.raises(ConfigError, match=r"version 2 .* Run python -m hrc_env benchmark again"):
         read_entry(path)
     path.write_text("{}")
-    with pytest.raises(ConfigError, match="not an entry of the benchmark"):
+    with pytest.raises(ConfigError, match="is not a result of the benchmark"):
         read_entry(path)
 
 
