@@ -232,7 +232,7 @@ def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:
         return TrainingResult(curve, {"training_s": passed_s, "processor_s": worked_s})
     words = ["python", "-m", "hrc_env", "train", "--resume", str(folder)]
     words += ["--timesteps", str(total)]
-    text = f"Stopped at {learner.num_timesteps:,} steps; the state is saved. To continue:  "
+    text = f"Stopped at {learner.num_timesteps:,} steps; the state is saved. To continue: "
     console.print(text + shlex.join(words), markup=False, highlight=False, soft_wrap=True)
     return TrainingResult(curve, None)
 

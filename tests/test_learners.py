@@ -114,7 +114,7 @@ def test_hindsight_is_for_goals():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--algorithm", "sac", "--her", "True"], "HRCReach-v0 has no goals apart from"),
+        (["--algorithm", "sac", "--her", "True"], "HRCReach-v0 has no goals separate from"),
         (["--her", "True"], "ppo has no replay buffer"),
         (["--algorithm", "scac"], "Did you mean 'sac'"),
         (["--demonstrations", "-1"], "--demonstrations must be 0 or more"),

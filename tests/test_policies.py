@@ -166,13 +166,13 @@ def test_an_address_is_a_file_of_the_package(exported, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("kwargs", "says"),
     [
-        ({"task": "HRCPickPlace-v0"}, "its task is HRCReach-v0, here it is HRCPickPlace-v0"),
-        ({"control": "tool"}, "its control is joint, here it is tool"),
-        ({"n_workers": 2}, "worker_joints_from_tool has 45 entries of 1, here 90 entries of 1"),
-        ({"n_workers": 0}, "worker_joints_from_tool has 45 entries of 1, here no entries"),
+        ({"task": "HRCPickPlace-v0"}, "its task is HRCReach-v0, but here it is HRCPickPlace-v0"),
+        ({"control": "tool"}, "its control is joint, but here it is tool"),
+        ({"n_workers": 2}, "worker_joints_from_tool has 45 entries of 1, but here 90 entries of 1"),
+        ({"n_workers": 0}, "worker_joints_from_tool has 45 entries of 1, but here no entries"),
         (
             {"config": {"forecast_s": [0.2]}},
-            "worker_joints_forecast has no entries, here 45 entries",
+            "worker_joints_forecast has no entries, but here 45 entries",
         ),
     ],
 )
@@ -192,7 +192,7 @@ def test_another_order_or_scale_of_terms_is_refused(exported):
     ]
     finer = replace(card.observation[0], scale=0.5), *card.observation[1:]
     (said,) = policies.list_differences(replace(card, observation=finer), info)
-    assert "6 entries of 0.5, here 6 entries of 1" in said
+    assert "6 entries of 0.5, but here 6 entries of 1" in said
 
 
 def test_a_damaged_file_is_refused(own):
@@ -217,7 +217,7 @@ def test_a_pickled_file_is_not_read(own, run):
 
 
 def test_files_that_are_no_policies_say_so(own, tmp_path):
-    with pytest.raises(CheckpointError, match=r"No .*missing\.safetensors"):
+    with pytest.raises(CheckpointError, match=r"missing\.safetensors is missing"):
         make_agent(str(tmp_path / "missing.safetensors"), here())
     whole = own.read_bytes()
     for content, says in (
@@ -236,7 +236,7 @@ def test_files_that_are_no_policies_say_so(own, tmp_path):
     ):
         make_agent(str(own), here())
     own.with_suffix(".json").unlink()
-    with pytest.raises(CheckpointError, match=r"No .*tiny\.json"):
+    with pytest.raises(CheckpointError, match=r"tiny\.json is missing"):
         make_agent(str(own), here())
 
 
@@ -250,7 +250,7 @@ def test_an_activation_that_nobody_knows_is_refused():
     [
         (["RUN", "--name", "Tiny"], "must consist of lowercase letters, digits and _"),
         (["RUN", "--name", "tiny"], "exists already; choose another --name"),
-        (["nowhere", "--name", "tiny"], "holds no run"),
+        (["nowhere", "--name", "tiny"], "contains no training run"),
         (["RUN", "--name", "tiny", "--episodes", "0"], "--episodes must be 1 or more"),
         (["RUN", "--name", "other", "--shields", "qq"], "Unknown shield 'qq'"),
     ],
@@ -279,4 +279,4 @@ def test_who_plays_a_policy_need_not_say_what_its_actions_are(capsys):
     assert main(command) == 0
     assert "screws driven" in capsys.readouterr().out
     assert main([*command, "--control", "joint"]) == 2
-    assert "its control is twist, here it is joint" in capsys.readouterr().err
+    assert "its control is twist, but here it is joint" in capsys.readouterr().err

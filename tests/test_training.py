@@ -90,7 +90,7 @@ def test_a_second_run_leaves_the_first_alone(run, tmp_path):
 def test_resuming_nothing_says_so_without_a_traceback(tmp_path):
     done = train("--resume", tmp_path / "nowhere")
     assert done.returncode == 2
-    assert "holds no run" in done.stderr
+    assert "contains no training run" in done.stderr
     assert "Traceback" not in done.stderr
 
 

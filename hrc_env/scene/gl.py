@@ -185,7 +185,7 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
         model: drawing model with the textures and meshes for the context.
 
     Raises:
-        RenderingError: no context could be made; the error names the remedy.
+        RenderingError: no context could be created; the error names the remedy.
     """
     import mujoco
 

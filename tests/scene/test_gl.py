@@ -126,7 +126,7 @@ def test_a_variable_that_keeps_pictures_away_is_named(name, value, process):
     """Clusters set it; whoever draws nothing does not notice."""
     done = process("-c", TRUTH, MUJOCO_GL="egl", **{name: value})
     assert done.returncode == 0, done.stderr
-    said = "RenderingError No OpenGL context could be made (MUJOCO_GL='egl', "
+    said = "RenderingError No OpenGL context could be created (MUJOCO_GL='egl', "
     assert said in done.stdout
     assert f"{name}={value!r}" in done.stdout
     assert not done.stderr
