@@ -7,21 +7,13 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # workers share the cores; read by NumPy and torch
 
-import gymnasium
 import pytest
 from commands import ROOT
 from figures import Figures, collect, write
 
-import hrc_env
-from hrc_env.core.registry import FILES, Registry
-from hrc_env.perception.detector import DETECTORS
 from hrc_env.perception.weights import fetch_weights
 from hrc_env.registration import import_files
-from hrc_env.safety.shield import SHIELDS
-from hrc_env.scene.robot import ROBOTS
-from hrc_env.tasks import BUILT_IN
-from hrc_env.tasks.task import TASKS
-from hrc_env.tracking.estimators import ESTIMATORS
+from tests.registrations import registrations_restored
 
 SLOW = {"process", "pixels", "end_to_end"}
 """Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
@@ -87,19 +79,17 @@ def process():
     return run
 
 
+@pytest.fixture(autouse=True)
+def registrations():
+    """No test leaves something registered to the next one in its process."""
+    with registrations_restored():
+        yield
+
+
 @pytest.fixture(scope="module")
 def brought():
     """What examples/bring_your_own registers is known, for the tests of one file."""
-    tables: list[Registry] = [TASKS, ESTIMATORS, DETECTORS, ROBOTS, SHIELDS]
-    before = [set(table) for table in tables]
     examples = sorted((ROOT / "examples" / "bring_your_own").glob("*.py"))
-    import_files(os.pathsep.join(map(str, examples)))
-    yield [path.stem for path in examples]
-    for table, had in zip(tables, before, strict=True):
-        for added in set(table) - had - set(BUILT_IN):
-            del table[added]
-            gymnasium.registry.pop(added, None)
-            hrc_env.IDS[:] = [each for each in hrc_env.IDS if each != added]
-    for path in examples:
-        del sys.modules[f"hrc_env_import_{path.stem}"]
-        FILES.pop(str(path), None)
+    with registrations_restored():
+        import_files(os.pathsep.join(map(str, examples)))
+        yield [path.stem for path in examples]

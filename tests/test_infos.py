@@ -23,15 +23,12 @@ SETTINGS = (
 @pytest.fixture(autouse=True)
 def half():
     """A shield that says something else, or nothing, in other steps."""
-    from hrc_env.safety.shield import SHIELDS
 
     def shield(belief, velocities, dt_s):
         far = np.isinf(belief.separation.distance_m).all(-1)
         return velocities / 2, {"nearness": np.where(far, np.nan, 1.0)}
 
     hrc_env.register_shield("half", shield)
-    yield
-    del SHIELDS["half"]
 
 
 def episodes(env, n_episodes=3, n_steps=40):

@@ -3,16 +3,20 @@
 import dataclasses
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
 import hrc_env
 from hrc_env import ConfigError, EstimatorSpec, Goal, HRCEnv, ObservationTerm, RewardTerm
 from hrc_env.core.errors import HRCError
+from hrc_env.core.registry import FILES
+from hrc_env.registration import import_files
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.tracking.particle import ParticleEstimator
+from tests.registrations import registrations_restored
 from tests.tasks.variants import vary
 
 REACH = hrc_env.find_task("HRCReach-v0")
@@ -192,3 +196,25 @@ def test_an_agent_is_refused_before_it_acts(make: Any, words: str) -> None:
     with pytest.raises(HRCError) as error:
         hrc_env.evaluate(make, 1, perception="none")
     assert words in str(error.value)
+
+
+def test_registrations_end_with_the_test_that_made_them(tmp_path):
+    """Two tests of one process may use the same name; the files of examples are modules, too."""
+    path = tmp_path / "own_shield.py"
+    path.write_text(
+        "import hrc_env\n"
+        "class Short(hrc_env.find_task('HRCReach-v0')):\n"
+        "    id = 'HRCShort-v0'\n"
+        "hrc_env.register_task(Short)\n"
+        "hrc_env.register_shield('own', lambda belief, velocities, dt_s: (velocities, {}))\n"
+    )
+    for _ in range(2):
+        with registrations_restored():
+            import_files(str(path))
+            assert "own" in SHIELDS
+            assert "HRCShort-v0" in hrc_env.IDS
+            assert "HRCShort-v0" in gymnasium.registry
+        assert "own" not in SHIELDS
+        assert "HRCShort-v0" not in hrc_env.IDS
+        assert "HRCShort-v0" not in gymnasium.registry
+        assert str(path) not in FILES

@@ -40,8 +40,8 @@ from hrc_env.experiments.runner import make_cache
 from hrc_env.experiments.setups import REFERENCE
 from hrc_env.experiments.site.experiment import Site
 from hrc_env.registration import import_files
-from hrc_env.safety.shield import SHIELDS
 from hrc_env.sb3 import HRCVecEnv
+from tests.registrations import registrations_restored
 
 pytestmark = pytest.mark.slow
 cloudpickle.register_pickle_by_value(calls)  # which workers cannot import
@@ -97,10 +97,9 @@ def shields(tmp_path_factory):
     """Shields of a user's file that fail, or end their process, where seven environments step."""
     path = tmp_path_factory.mktemp("shields") / "failing_shields.py"
     path.write_text(FAILING)
-    import_files(str(path))
-    yield
-    for name in ("raises", "exits"):
-        del SHIELDS[name]
+    with registrations_restored():
+        import_files(str(path))
+        yield
 
 
 def silent(k, share):

@@ -2,13 +2,11 @@
 
 from dataclasses import replace
 
-import gymnasium
 import numpy as np
 import pytest
 
 import hrc_env
 from hrc_env.registration import IDS
-from hrc_env.tasks.task import TASKS
 from tests.tasks.variants import vary
 
 REACH, WITH_GOAL = (hrc_env.find_task(f"HRCReach{each}-v0") for each in ("", "Goal"))
@@ -97,5 +95,3 @@ def test_tasks_of_the_package_are_taken_under_other_names(task):
     again = f"Again{task}"
     hrc_env.register_task(vary(hrc_env.find_task(task), id=again))
     assert again in IDS
-    IDS.remove(again)
-    del TASKS[again], gymnasium.registry[again]
