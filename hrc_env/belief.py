@@ -13,15 +13,10 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.lending import read_only
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
-from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointVelocities, Points3
 from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M, WALKING_M_S, Coverage, Others, Vacancy
-from hrc_env.geometry.distances import (
-    Separation,
-    closest_parameters,
-    least_separation,
-    segments,
-)
+from hrc_env.geometry.distances import Separation, closest_parameters, least_separation
+from hrc_env.geometry.enclosure import enclose
 from hrc_env.geometry.robot_model import RobotModel
 
 PERSON_M = 0.5
@@ -105,9 +100,9 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
     The distance is infinite for a worker without a track. `PoseEstimate.unknown` marks the slots
     for which an undetected person may be near.
     """
-    bodies = segments(estimate.mean_world)
+    bodies = enclose(estimate.mean_world)
     nearest = least_separation(
-        robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M
+        robot.capsules_world, robot.capsule_radius_m, bodies.ends_world, bodies.radius_m
     )
     return replace(nearest, distance_m=np.where(estimate.tracked, nearest.distance_m, np.inf))
 

@@ -153,9 +153,11 @@ class Simulation(Stateful):
         )
         self.layout = observations.make_layout(self.terms, sizes)
         self.model = robot_model(self.scene, max_command(self.control, self.chain, config.control))
+        n_capsules = len(self.chain.capsule_radius_m) + self.scene.objects.capsule_radius_m.size
         self.monitor = IncidentMonitor(
-            batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
-        )
+            batch, self.scene.n_workers, self.bodies.capsule_names, n_capsules, self.model,
+            config.ctrl_dt,
+        )  # fmt: skip
         self.physics = Physics(self.scene, batch)
         self.cameras = EpisodeCameras(batch, settings, self.scene)
         """Cameras and perception pipelines of the environments."""

@@ -180,13 +180,24 @@ ENTRIES: dict[str, Entry] = {
     "safety/time_to_stop_s": Entry("s", "time until all joints stop, at their maximum slew rate"),
     "safety/contact_robot_speed_m_s": Entry(
         "m/s",
-        "for a contact that begins: the robot's speed towards the worker in the previous "
-        f"step; {CAME}",
+        "for a contact that begins: the speed of the robot's touching point towards the worker in "
+        f"the previous step; {CAME}",
         0.0,
     ),
     "safety/contact_closing_speed_m_s": Entry(
         "m/s",
         f"for a contact that begins: that speed plus the worker's speed towards the robot; {CAME}",
+        0.0,
+    ),
+    "safety/contact_recent_robot_speed_m_s": Entry(
+        "m/s",
+        f"for a contact that begins: that speed's maximum over the last five steps; {CAME}",
+        0.0,
+    ),
+    "safety/contact_recent_closing_speed_m_s": Entry(
+        "m/s",
+        "for a contact that begins: maximum closing speed of the touching points over the contact "
+        f"and the last five steps; {CAME}",
         0.0,
     ),
     "safety/contact_force_ratio": Entry(

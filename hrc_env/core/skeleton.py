@@ -50,29 +50,3 @@ BONE_LENGTH_M: Floats = np.array(
 are means over the workers' body models, with joints as BlazePose locates them: the hips are higher
 and the toes farther out than the anatomical ones. Trackers that learn bone lengths refine them for
 each worker."""
-
-SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
-    ((0,), (0,), 0.13),  # head, a sphere around the nose that includes the hat's front
-    ((1, 2), (7, 8), 0.16),  # trunk: mid-shoulder to mid-hip
-    ((1,), (2,), 0.09),  # shoulder girdle
-    ((7,), (8,), 0.13),  # pelvis
-    ((1,), (3,), 0.065), ((2,), (4,), 0.065),  # upper arms
-    ((3,), (5,), 0.055), ((4,), (6,), 0.055),  # forearms (hands: HAND_SEGMENTS)
-    ((7,), (9,), 0.09), ((8,), (10,), 0.09),  # thighs
-    ((9,), (11,), 0.065), ((10,), (12,), 0.065),  # shanks
-    ((11,), (13,), 0.055), ((12,), (14,), 0.055),  # feet
-)  # fmt: skip
-"""Body segments that are computed from joints alone: indices of the joints that are averaged for
-the first end, indices of those that are averaged for the second end, and the radius [m]."""
-
-HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
-    (3, 5, 0.18, 0.05),
-    (4, 6, 0.18, 0.05),
-)
-"""Hands, which are not among the 15 joints: indices of elbow and wrist, length beyond the wrist
-[m], and radius [m]."""
-
-
-SEGMENT_RADIUS_M: Floats = np.array(
-    [radius for *_, radius in SEGMENT_ENDS] + [radius for *_, radius in HAND_SEGMENTS]
-)

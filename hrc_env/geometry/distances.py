@@ -12,17 +12,13 @@ import numpy as np
 
 from hrc_env.core.batching import flatten_axes
 from hrc_env.core.kernels import kernel
-from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
-from hrc_env.core.typing import Capsules, Floats, Ints, Points3
+from hrc_env.core.typing import Capsules, Floats, Points3
 
 SLACK_M = 1e-9
 """Tolerance of the distance bounds from bounding spheres, far above their rounding errors [m]."""
 _PARALLEL = 1e-13
 """Squared sine of the angle below which segments are considered parallel. Such segments diverge by
 less than a micrometre per metre."""
-_ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
-"""(K, 2, 2) indices of the two joints with each end of a segment at their midpoint; if an end is at
-a joint, both indices are that of the joint."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,35 +191,3 @@ def _search_pairs(
                         points[0, i] = a[k, 0, i] + closest.s * (a[k, 1, i] - a[k, 0, i])
                         points[1, i] = b[m, 0, i] + closest.t * (b[m, 1, i] - b[m, 0, i])
     return best
-
-
-def segments(joints_world: Points3) -> Capsules:
-    """Return the axes of the capsules of a body with joints (..., 15, 3) [m].
-
-    Returns:
-        (..., 16, 2, 3) end points, with the hands last [m]; the radii are `SEGMENT_RADIUS_M`.
-    """
-    joints = flatten_axes(joints_world, 2)
-    ends = np.empty((len(joints), len(SEGMENT_RADIUS_M), 2, 3))
-    _write_segments(joints, ends)
-    return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])
-
-
-@kernel
-def _write_segments(joints: Points3, ends: Capsules) -> None:
-    """Compute the segments `ends` (B, 16, 2, 3) of bodies with joints (B, 15, 3) [m]."""
-    for b in range(joints.shape[0]):
-        for k in range(len(_ENDS)):
-            for e in range(2):
-                first, second = joints[b, _ENDS[k, e, 0]], joints[b, _ENDS[k, e, 1]]
-                for i in range(3):
-                    ends[b, k, e, i] = 0.5 * (first[i] + second[i])
-        for h in range(len(HAND_SEGMENTS)):
-            elbow, wrist = joints[b, HAND_SEGMENTS[h][0]], joints[b, HAND_SEGMENTS[h][1]]
-            squared, k = 0.0, len(_ENDS) + h
-            for i in range(3):
-                squared += (wrist[i] - elbow[i]) ** 2
-            share = HAND_SEGMENTS[h][2] / max(math.sqrt(squared), 1e-6)
-            for i in range(3):
-                ends[b, k, 0, i] = wrist[i]
-                ends[b, k, 1, i] = wrist[i] + share * (wrist[i] - elbow[i])

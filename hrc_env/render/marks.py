@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.batching import one
-from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Capsules, Floats, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.geometry.distances import segments
+from hrc_env.geometry.enclosure import enclose
 from hrc_env.motion import generator
 from hrc_env.render import overlay
 from hrc_env.scene.canvas import Marks
@@ -60,15 +59,15 @@ def find_solids(simulation: Simulation, b: int) -> tuple[Solids, ...]:
     people.
     """
     robot, estimate = simulation.belief.robot, one(simulation.estimate, b)
-    believed = segments(estimate.mean_world[estimate.tracked])
+    believed = enclose(estimate.mean_world[estimate.tracked])
     motion = one(generator.current(simulation.motion, np.array([b])), 0)
     truth, present = worker_truth(simulation.bodies, motion), simulation.present[b]
     return (
         Solids("robot", robot.capsules_world[b], robot.capsule_radius_m),
         Solids(
             "people, estimated",
-            believed.reshape(-1, 2, 3),
-            np.tile(SEGMENT_RADIUS_M, len(believed)),
+            believed.ends_world.reshape(-1, 2, 3),
+            believed.radius_m.reshape(-1),
         ),
         Solids(
             "people, true",

@@ -18,6 +18,7 @@ other people and parts of the body are unchanged.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
 from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
-from hrc_env.geometry.distances import segments
+from hrc_env.geometry.enclosure import CAPSULES, enclose, find_velocities, load_enclosure
 from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.constraints import (
@@ -42,7 +43,7 @@ from hrc_env.safety.constraints import (
     add_floor_constraints,
     add_worker_constraints,
 )
-from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
+from hrc_env.safety.contact import CAPSULE_REGIONS, permitted_contact_speed
 from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
@@ -96,11 +97,13 @@ def limit_command(
     """
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
     found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
-    allowed, slack = np.empty_like(velocities), np.empty(len(velocities))
+    limit = partial(limit_speed, pose.frames, pose.model.chain.slides, pose.links,
+                    belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
+    wanted, allowed, slack = velocities.copy(), np.empty_like(velocities), np.empty(len(velocities))
+    limit(wanted)
     choose = scale_velocities if config.kind == "ssm" else find_nearest_velocities
-    choose(found, velocities, allowed)
-    limit_speed(pose.frames, pose.model.chain.slides, pose.links, belief.robot.capsules_world,
-                undetected.speed_limit_m_s, allowed)  # fmt: skip
+    choose(found, wanted, allowed)
+    limit(allowed)
     find_slack(found, allowed, slack)
     unknown = belief.estimate.unknown | undetected.is_lost
     values = {
@@ -192,16 +195,20 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
         cov = np.where(lost[..., None], 0.0, cov)
         contact_m_s = np.where(lost[..., 0], 0.0, contact_m_s)
     walking_m_s = WALKING_M_S if config.worker_speed_m_s is None else config.worker_speed_m_s
+    capsules, enclosure = enclose(mean), load_enclosure()
+    influence = np.abs(enclosure.weights)
     return Bodies(
-        segments=segments(mean),
-        mean=mean,
-        velocity=velocity,
+        segments=capsules.ends_world,
+        radii_m=capsules.radius_m,
+        velocity=find_velocities(mean, velocity),
         cov=cov,
         age_s=estimate.age_s,
         is_located=estimate.tracked | is_lost,
         moved_m=np.where(is_lost, walking_m_s * estimate.unobserved_s, 0.0),
         contact_m_s=contact_m_s,
         robot_share_m_s=touches.capsule_m_s,
+        joints=enclosure.joints,
+        shares=influence / influence.sum(-1, keepdims=True),
     )
 
 
@@ -219,7 +226,7 @@ class AllowedTouches:
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
     """Return the allowed touches: all touches for "pfl", otherwise those that the task permits."""
     model, links = pose.model, pose.links
-    shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
+    shape = (*belief.estimate.tracked.shape, len(CAPSULES))
     if config.kind == "pfl":
         allowed, capsule_m_s = np.ones(shape, bool), np.full(len(links), np.inf)
     elif belief.allowed_contact is None:
@@ -230,8 +237,9 @@ def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -
         capsule_m_s = np.where(is_last, config.contact_speed_m_s, 0.0)
     carried = 0.0 if belief.objects is None else belief.objects.held @ model.load_kg
     mass_kg = np.broadcast_to(model.mass_kg + carried, len(belief.action))
-    speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(SEGMENT_REGIONS)}
-    bears_m_s = np.stack([speeds[name] for name in SEGMENT_REGIONS], axis=1)[:, None]
+    regions = [CAPSULE_REGIONS[name] for name in CAPSULES]
+    speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(regions)}
+    bears_m_s = np.stack([speeds[name] for name in regions], axis=1)[:, None]
     return AllowedTouches(np.where(allowed, bears_m_s, 0.0), capsule_m_s)
 
 

@@ -1,6 +1,7 @@
 """Settings of the built-in shields."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import ClassVar, NamedTuple
@@ -9,23 +10,21 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, check_names
 from hrc_env.core.mapping import answer_unknown_fields
-from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
 
 KINDS = ("qp", "ssm", "pfl")
 MARGINS = ("margin_m", "hand_margin_m")
 """Names of the settings of `ShieldConfig` that may be negative."""
-IS_FOREARM_OR_HAND: Bools = np.array(
-    [False] * 6 + [True] * 2 + [False] * (len(SEGMENT_ENDS) - 8) + [True] * len(HAND_SEGMENTS)
-)
-"""Mask of the segments to which `ShieldConfig.hand_margin_m` applies (S,)."""
+IS_FOREARM_OR_HAND: Bools = np.array([name.endswith(("forearm", "hand")) for name in CAPSULES])
+"""Mask of the capsules of a body to which `ShieldConfig.hand_margin_m` applies (S,)."""
 
 
 class ShieldParams(NamedTuple):
     """Settings of a `ShieldConfig` as arguments of compiled kernels."""
 
     margins_m: Floats
-    """`margin_m` or `hand_margin_m` of each segment of a body (S,) [m]."""
+    """Distance that is subtracted from the gap of each capsule of a body (S,) [m]."""
     n_sigmas: float
     """Uncertainty margin Z_d, in standard deviations."""
     min_uncertainty_m: float
@@ -82,17 +81,17 @@ class ShieldConfig:
     """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
     "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
     the speed that the touched region of the body tolerates."""
-    margin_m: float = 0.05
-    """Distance subtracted from every gap, because capsules only approximate bodies [m]. With a
-    negative value, the shield permits smaller distances than the estimate requires; the command
-    `experiment price` uses such values to compare shields at an equal rate of contacts."""
-    hand_margin_m: float = 0.13
+    margin_m: float = 0.0
+    """Distance subtracted from every gap [m], in addition to the distance by which a true body may
+    protrude from its estimated capsules (`Enclosure.protrusion_m`). A negative value takes away
+    what protects people, which a warning says."""
+    hand_margin_m: float = 0.0
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
     nearly all contacts [m]."""
     n_sigmas: float = 2.0
     """Uncertainty margin Z_d, in standard deviations of the estimate along the line between robot
     and worker."""
-    min_uncertainty_m: float = 0.05
+    min_uncertainty_m: float = 0.03
     """Lower bound on the uncertainty margin Z_d [m]."""
     prediction_growth_m_s: float = 0.7
     """Part of the standard deviation due to prediction, per second since a part of the body was
@@ -106,9 +105,9 @@ class ShieldConfig:
     worker_speed_m_s: float | None = None
     """Speed of a worker towards the robot, 1.6 in ISO 13855 [m/s]; None for the estimated speed
     plus `worker_speed_margin_m_s`."""
-    worker_speed_margin_m_s: float = 0.2
+    worker_speed_margin_m_s: float = 0.1
     """Amount by which a worker may be faster than estimated [m/s]."""
-    worker_time_s: float = 0.2
+    worker_time_s: float = 0.3
     """Time for which a worker is assumed to approach the robot at the worker's speed [s]."""
     latency_s: float = 0.0
     """Additional age of the estimate, for delayed images without time stamps [s]."""
@@ -150,12 +149,20 @@ class ShieldConfig:
                 raise ConfigError(f"{name} must be a finite number, got {getattr(self, name)}.")
         check_fields(self, "be positive", "deceleration_m_s2", "retreat_gain_hz")
         check_fields(self, "not be negative", *(name for name in given if name not in MARGINS))
+        for name in MARGINS:
+            if getattr(self, name) < 0.0:
+                warnings.warn(
+                    f"{name} is {getattr(self, name)} m: a negative margin takes away from the "
+                    "distance that protects people.",
+                    stacklevel=3,
+                )
 
     def make_params(self) -> ShieldParams:
         """Return the settings as arguments of compiled kernels."""
         speed_m_s = self.worker_speed_m_s
+        margins_m = np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m)
         return ShieldParams(
-            margins_m=np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m),
+            margins_m=load_enclosure().protrusion_m + margins_m,
             n_sigmas=float(self.n_sigmas),
             min_uncertainty_m=float(self.min_uncertainty_m),
             prediction_growth_m_s=float(self.prediction_growth_m_s),

@@ -1,13 +1,15 @@
 """Constraints n.J qd <= b on the speed at which a robot's capsules approach estimated bodies.
 
-For every pair of a robot's capsule and a segment of an estimated body, n is the unit vector from
-the robot's nearest point to the body's, and the clearance is
+For every pair of a robot's capsule and a capsule of an estimated body (`geometry.enclosure`; here
+called a segment), n is the unit vector from the robot's nearest point to the body's, and the
+clearance is
 
     D = gap - margin - Z_d - v_h T_h,   Z_d = max(z, predicted + k seen + k' max(seen - s', 0))
 
 with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
 of predicted^2 + seen^2. From `ShieldConfig` come k `n_sigmas`, k' `single_view_sigmas`, s'
-`single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is `margin_m` or
+`single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is the distance by which
+a true body may protrude from the segment (`Enclosure.protrusion_m`) plus `margin_m` or
 `hand_margin_m`. If a body has not been detected recently, for example because images are delayed,
 most of the deviation is due to prediction, which overestimates it. A `seen` above s' indicates a
 part that a single camera locates, for which actual errors exceed the estimated ones. If D >= 0, the
@@ -32,7 +34,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -42,7 +43,6 @@ from hrc_env.core.typing import (
     JointVelocities,
     Points3,
     Transforms,
-    Vector3,
     Velocities3,
 )
 from hrc_env.core.vacancy import POSSIBLE, STATURE_M
@@ -57,16 +57,6 @@ ABSENT_M = 1e3
 RANKING_HZ = 1e-4
 """Ratio of retreat speed to -D for positions where a lost worker may be [1/s]. It causes hardly any
 motion, but makes the constraints of the nearest pairs the tightest ones."""
-MIN_FOREARM_M = 0.1
-"""Lower bound on the estimated length of a forearm, from which the speed of the fingertips is
-extrapolated [m]."""
-_N_LIMBS = len(SEGMENT_ENDS)
-_JOINTS: Ints = np.array(
-    [[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS]
-    + [[(wrist, wrist)] * 2 for _, wrist, *_ in HAND_SEGMENTS]
-)
-"""Indices of the two joints with each end of a segment at their midpoint (S, 2, 2). Both ends of a
-hand are at its wrist."""
 
 
 class Robots(NamedTuple):
@@ -95,10 +85,10 @@ class Bodies(NamedTuple):
 
     segments: Capsules
     """End points of the segments in the world frame (B, W, S, 2, 3) [m]."""
-    mean: Points3
-    """Estimated positions of the joints (B, W, J, 3) [m]."""
+    radii_m: Floats
+    """Radius of each segment (B, W, S) [m]."""
     velocity: Velocities3
-    """Estimated velocities of the joints (B, W, J, 3) [m/s]."""
+    """Estimated velocities of the end points (B, W, S, 2, 3) [m/s]."""
     cov: Covariances3
     """Covariance of each joint's position (B, W, J, 3, 3) [m^2]."""
     age_s: Floats
@@ -113,6 +103,10 @@ class Bodies(NamedTuple):
     allowed."""
     robot_share_m_s: Floats
     """Maximum speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
+    joints: Ints
+    """Indices of the joints on which the end points depend (S, 2, T)."""
+    shares: Floats
+    """Influence of these joints on the end points (S, 2, T), with the sum 1 for each."""
 
 
 class UnseenFloors(NamedTuple):
@@ -160,15 +154,25 @@ class Arm(NamedTuple):
     """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
 
 
-class Body(NamedTuple):
-    """One estimated body of `Bodies`."""
+class Segment(NamedTuple):
+    """One segment of one estimated body of `Bodies`."""
 
-    mean: Points3
-    """Estimated positions of the joints (J, 3) [m]."""
+    ends: Floats
+    """End points (2, 3) [m]."""
+    radius_m: float
+    """Radius [m]."""
     velocity: Velocities3
-    """Estimated velocities of the joints (J, 3) [m/s]."""
+    """Estimated velocities of the end points (2, 3) [m/s]."""
+    joints: Ints
+    """Indices of the joints on which the end points depend (2, T)."""
+    shares: Floats
+    """Influence of these joints on the end points (2, T)."""
     cov: Covariances3
     """Covariance of each joint's position (J, 3, 3) [m^2]."""
+    age_s: Floats
+    """Time since each joint was last supported by a measurement (J,) [s]."""
+    margin_m: float
+    """Distance that is subtracted from every gap [m]."""
 
 
 class Nearest(NamedTuple):
@@ -222,22 +226,20 @@ def add_worker_constraints(
         for w in range(bodies.segments.shape[1]):
             if not bodies.is_located[e, w]:
                 continue
-            body = Body(bodies.mean[e, w], bodies.velocity[e, w], bodies.cov[e, w])
             moved = bodies.moved_m[e, w]
             for s in range(n_segments):
-                bound_capsule(bodies.segments[e, w, s], SEGMENT_RADIUS_M[s], limbs[s])
-                limbs[s, 4] = bound_deduction(body, s, params) + moved
+                segment = select_segment(bodies, params, e, w, s)
+                bound_capsule(segment.ends, segment.radius_m, limbs[s])
+                limbs[s, 4] = bound_deduction(segment, params) + moved
             for c, s in np.ndindex(n_caps, n_segments):
                 if sphere_gap(rods[c], limbs[s]) > rods[c, 4] + limbs[s, 4]:
                     continue
-                nearest = find_nearest(
-                    robots.capsules[e, c], bodies.segments[e, w, s], point, normal
-                )
-                towards = project_motion(body, s, nearest.along, normal)
-                age_s = find_segment_age(bodies.age_s[e, w], s)
-                z_d = find_uncertainty(towards.std_m, age_s, params) + moved
-                gap = nearest.distance_m - robots.radii_m[c] - SEGMENT_RADIUS_M[s]
-                near = gap - params.margins_m[s] - z_d
+                segment = select_segment(bodies, params, e, w, s)
+                nearest = find_nearest(robots.capsules[e, c], segment.ends, point, normal)
+                towards = project_motion(segment, nearest.along, normal)
+                z_d = find_uncertainty(towards.std_m, find_segment_age(segment), params) + moved
+                gap = nearest.distance_m - robots.radii_m[c] - segment.radius_m
+                near = gap - segment.margin_m - z_d
                 clear = near - find_travel(towards.speed_m_s, params)
                 out.clearance_m[e] = min(out.clearance_m[e], clear)
                 link = int(robots.links[c])
@@ -343,21 +345,37 @@ def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldPara
     return fastest * (params.reaction_s + 0.5 * braking_s)
 
 
+@kernel(makes_arrays=True)
+def select_segment(bodies: Bodies, params: ShieldParams, e: int, w: int, s: int) -> Segment:
+    """Return segment `s` of worker `w` in environment `e`."""
+    return Segment(
+        bodies.segments[e, w, s],
+        bodies.radii_m[e, w, s],
+        bodies.velocity[e, w, s],
+        bodies.joints[s],
+        bodies.shares[s],
+        bodies.cov[e, w],
+        bodies.age_s[e, w],
+        params.margins_m[s],
+    )
+
+
 @kernel
-def bound_deduction(body: Body, s: int, params: ShieldParams) -> float:
-    """Return an upper bound on the difference between gap and clearance of segment `s` [m].
+def bound_deduction(segment: Segment, params: ShieldParams) -> float:
+    """Return an upper bound on the difference between gap and clearance of a segment [m].
 
     The bound holds for every direction of n.
     """
     squared, variance = 0.0, 0.0
     for end in range(2):
-        x, y, z = find_end_velocity(body, s, end)
-        squared = max(squared, x * x + y * y + z * z)
-        for k in range(2):
-            S = body.cov[_JOINTS[s, end, k]]
-            variance = max(variance, S[0, 0] + S[1, 1] + S[2, 2])
+        v, of_end = segment.velocity[end], 0.0
+        squared = max(squared, v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        for k in range(segment.joints.shape[1]):
+            S = segment.cov[segment.joints[end, k]]
+            of_end += segment.shares[end, k] * (S[0, 0] + S[1, 1] + S[2, 2])
+        variance = max(variance, of_end)
     std_m = math.sqrt(variance)
-    margin = params.margins_m[s] + std_m
+    margin = segment.margin_m + std_m
     return margin + find_uncertainty(std_m, 0.0, params) + find_travel(math.sqrt(squared), params)
 
 
@@ -393,31 +411,14 @@ def find_travel(speed_m_s: float, params: ShieldParams) -> float:
 
 
 @kernel
-def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
-    """Return the velocity of an end of segment `s` [m/s].
-
-    The tip of a hand moves with the rotation of its forearm.
-    """
-    one, two = body.velocity[_JOINTS[s, end, 0]], body.velocity[_JOINTS[s, end, 1]]
-    x, y, z = 0.5 * (one[0] + two[0]), 0.5 * (one[1] + two[1]), 0.5 * (one[2] + two[2])
-    if s >= _N_LIMBS and end == 1:
-        elbow, wrist, reach, _ = HAND_SEGMENTS[s - _N_LIMBS]
-        squared = 0.0
-        for i in range(3):
-            squared += (body.mean[wrist, i] - body.mean[elbow, i]) ** 2
-        share, v = reach / max(math.sqrt(squared), MIN_FOREARM_M), body.velocity[elbow]
-        x, y, z = x + share * (x - v[0]), y + share * (y - v[1]), z + share * (z - v[2])
-    return Vector3(x, y, z)
-
-
-@kernel
-def find_segment_age(age_s: Floats, s: int) -> float:
-    """Return the time since any joint of segment `s` was last detected [s]; `age_s` is (J,)."""
+def find_segment_age(segment: Segment) -> float:
+    """Return the time since any joint of a segment was last detected [s]."""
     least = np.inf
     for end in range(2):
-        for k in range(2):
-            j: int = _JOINTS[s, end, k]
-            least = min(least, float(age_s[j]))
+        for k in range(segment.joints.shape[1]):
+            if segment.shares[end, k] > 0.0:
+                j: int = segment.joints[end, k]
+                least = min(least, float(segment.age_s[j]))
     return least
 
 
@@ -441,12 +442,11 @@ def find_nearest(capsule: Floats, segment: Floats, point: Floats, normal: Floats
 
 
 @kernel
-def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach:
+def project_motion(segment: Segment, along: float, normal: Floats) -> Approach:
     """Project the velocity and the covariance of a point of a segment onto n.
 
     Args:
-        body: the estimated body.
-        s: index of the segment.
+        segment: the segment of an estimated body.
         along: position of the point, from 0 at the segment's first end to 1 at its second.
         normal: (3,) unit vector n.
     """
@@ -454,13 +454,13 @@ def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach
     speed, variance = 0.0, 0.0
     for end in range(2):
         share = along if end else 1.0 - along
-        x, y, z = find_end_velocity(body, s, end)
-        speed -= share * (nx * x + ny * y + nz * z)
-        for k in range(2):
-            S = body.cov[_JOINTS[s, end, k]]
+        v = segment.velocity[end]
+        speed -= share * (nx * v[0] + ny * v[1] + nz * v[2])
+        for k in range(segment.joints.shape[1]):
+            S = segment.cov[segment.joints[end, k]]
             across = nx * (ny * S[0, 1] + nz * S[0, 2]) + ny * nz * S[1, 2]
             squares = nx * nx * S[0, 0] + ny * ny * S[1, 1] + nz * nz * S[2, 2]
-            variance += 0.5 * share * (squares + 2.0 * across)
+            variance += share * segment.shares[end, k] * (squares + 2.0 * across)
     return Approach(speed, math.sqrt(max(variance, 0.0)))
 
 

@@ -57,19 +57,26 @@ REGIONS: dict[str, BodyRegion] = {
     )
 }
 """Regions of the body, by name."""
-SEGMENT_REGIONS: tuple[str, ...] = (
-    "skull and forehead",
-    "chest",
-    "back and shoulders",
-    "pelvis",
-    *2 * ("upper arm and elbow",),
-    *2 * ("lower arm and wrist",),
-    *2 * ("thigh and knee",),
-    *4 * ("lower leg",),
-    *2 * ("hand and fingers",),
-)
-"""Region of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`). If a segment
-covers several regions, it is the one with the lowest limit."""
+_SIDED = {
+    "shoulder": "back and shoulders",
+    "upper_arm": "upper arm and elbow",
+    "forearm": "lower arm and wrist",
+    "thigh": "thigh and knee",
+    "shank": "lower leg",
+    "foot": "lower leg",
+    "hand": "hand and fingers",
+}
+CAPSULE_REGIONS: dict[str, str] = {
+    "head": "skull and forehead",
+    "neck": "neck",
+    "chest": "chest",
+    "torso": "chest",
+    "abdomen": "abdomen",
+    "pelvis": "pelvis",
+    **{f"{side}_{part}": region for part, region in _SIDED.items() for side in ("left", "right")},
+}
+"""Region of the body to which each capsule belongs, by the name of the capsule
+(`worker.body.Body.capsule_names`)."""
 
 
 def find_region(name: str) -> BodyRegion:

@@ -7,8 +7,8 @@ import numpy as np
 
 from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_fields, check_names
-from hrc_env.core.typing import Floats
-from hrc_env.safety.incidents import TOWARDS, Incident
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.safety.incidents import FLEEING, MOVING_M_S, TOWARDS, Incident
 
 _BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
     "towards": lambda incidents: (incidents["kind"] == TOWARDS).sum(1).astype(float),
@@ -22,7 +22,7 @@ _BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
 that begin while the robot moves towards the worker; the sum of the forces of contacts that begin,
 relative to the permitted forces; 1 if the robot moves towards a worker within the protective
 distance; and the number of near misses."""
-COMPONENTS = ("proximity", "contact", *_BY_INCIDENT)
+COMPONENTS = ("proximity", "contact", "unsafe", *_BY_INCIDENT)
 """Names of the components that `CostConfig.components` accepts."""
 FORMER_COMPONENT = "too_near"
 """Former name of the component "separation_violated"."""
@@ -34,7 +34,8 @@ class CostConfig:
 
     components: tuple[str, ...] = ("proximity", "contact")
     """Components that are added up: "proximity", 1 for a step nearer than `proximity_m`; "contact",
-    1 for a step with a contact; "towards", contacts that begin while the robot moves towards the
+    1 for a step with a contact; "unsafe", an indicator for constraints (`find_unsafe`), which is 0
+    while the robot stands; "towards", contacts that begin while the robot moves towards the
     worker; "force", forces of contacts relative to the permitted ones; "separation_violated", 1 for
     a step within the protective distance while approaching; "near_miss". With the default
     components, the cost is a number of control steps."""
@@ -69,6 +70,8 @@ class Cost:
     [control steps]."""
     min_separation_m: Floats
     """Smallest true separation in the step (B,) [m]; infinite without workers."""
+    is_near: Bools
+    """Mask (B, W) of the workers that were nearer than `CostConfig.proximity_m`."""
 
 
 def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
@@ -77,12 +80,31 @@ def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
     Contacts are detected by distance instead of the contact solver, because a hand that follows a
     recording can pass through a thin arm between two physics steps.
     """
-    nearest_m = gaps_m.min((1, 2), initial=np.inf)
+    of_workers_m = gaps_m.min(1, initial=np.inf)
+    nearest_m = of_workers_m.min(1, initial=np.inf)
     return Cost(
         proximity=(nearest_m < config.proximity_m).astype(float),
         contact=(nearest_m <= 0.0).astype(float),
         min_separation_m=nearest_m,
+        is_near=of_workers_m < config.proximity_m,
     )
+
+
+def find_unsafe(cost: Cost, incidents: Records2[Incident]) -> Floats:
+    """Return 1 for environments in which the robot endangered a worker in a step, otherwise 0 (B,).
+
+    A step is unsafe if the robot is near a worker and its directed speed exceeds `MOVING_M_S`, if
+    it moves into a contact, or if it retreats too late from a contact with more force than the
+    touched region tolerates. A standing robot that is touched is safe.
+
+    Args:
+        cost: cost from separations.
+        incidents: (B, W) incidents of the step.
+    """
+    kind = incidents["kind"]
+    comes_near = cost.is_near & (incidents["robot_m_s"] > MOVING_M_S)
+    too_hard = (kind == FLEEING) & (incidents["force_ratio"] > 1.0)
+    return (comes_near | (kind == TOWARDS) | too_hard).any(1).astype(float)
 
 
 def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) -> dict[str, Floats]:
@@ -96,8 +118,12 @@ def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) ->
         config: settings that select the components.
     """
     components = {"proximity": cost.proximity, "contact": cost.contact}
-    chosen = (name for name in config.components if name not in components)
-    return components | {name: _BY_INCIDENT[name](incidents) for name in chosen}
+    for name in config.components:
+        if name == "unsafe":
+            components[name] = find_unsafe(cost, incidents)
+        elif name not in components:
+            components[name] = _BY_INCIDENT[name](incidents)
+    return components
 
 
 def sum_cost(components: Mapping[str, Floats], config: CostConfig) -> Floats:

@@ -3,12 +3,14 @@
 All values are computed from the true poses of the bodies at the physics steps of a control step. A
 *directed speed* is the rate at which one body's motion reduced the separation, with the other body
 held at its final pose. A contact begins when surfaces touch that have not touched for
-`CONTACT_GAP_S`, because an arm that is hit bounces. The kind of a contact describes the robot's
-motion in the previous control step, because the impact changes the motion in the step itself: the
-robot moved *towards* the worker, was *fleeing*, or was *standing*. The closing speed is the sum of
-the robot's directed speed in the previous step and the worker's, which no impact changes. The force
-of a contact is computed by the model of ISO/TS 15066, A.3, and divided by the permitted force of
-the touched region (`safety.contact`).
+`CONTACT_GAP_S`, because an arm that is hit bounces. Kind and speeds of a contact are those of the
+two points that touch, along the line between them. The kind describes the robot's motion in the
+previous control step, because the impact changes the motion in the step itself: the robot moved
+*towards* the worker, was *fleeing*, or was *standing*. The closing speed is the sum of the robot's
+speed in the previous step and the worker's, which no impact changes. The greatest speeds of the
+last `N_RECENT` steps are reported beside them, because a robot may brake before it touches. The
+force of a contact is computed by the model of ISO/TS 15066, A.3, and divided by the permitted force
+of the touched region (`safety.contact`).
 """
 
 from collections.abc import Sequence
@@ -21,10 +23,10 @@ from hrc_env.core.batching import Stateful
 from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Capsules, Floats, Ints
-from hrc_env.geometry.distances import least_separation
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3, Velocities3
+from hrc_env.geometry.distances import closest_parameters, least_separation
 from hrc_env.geometry.robot_model import RobotModel
-from hrc_env.safety.contact import REGIONS, BodyRegion, contact_force
+from hrc_env.safety.contact import CAPSULE_REGIONS, REGIONS, BodyRegion, contact_force
 from hrc_env.safety.separation import protective_distance
 from hrc_env.world import World
 
@@ -43,38 +45,18 @@ NEAR_MISS_M, CLEAR_M = 0.05, 0.10
 The values are estimates."""
 REACTION_S = 0.1
 """Reaction time in the computation of the protective distance [s]. It is a typical value."""
+N_RECENT = 5
+"""Number of steps before a contact of which the greatest speeds are reported."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
 WITHIN, BEYOND, NEVER = 1, 2, 3
 """Severities of a contact: within the limit of the region, beyond the limit, and contact with the
 head, which is never permitted."""
-_SIDED = {
-    "shoulder": "back and shoulders",
-    "upper_arm": "upper arm and elbow",
-    "forearm": "lower arm and wrist",
-    "thigh": "thigh and knee",
-    "shank": "lower leg",
-    "foot": "lower leg",
-    "hand": "hand and fingers",
-}
-CAPSULE_REGIONS: dict[str, str] = {
-    "head": "skull and forehead",
-    "neck": "neck",
-    "chest": "chest",
-    "torso": "chest",
-    "abdomen": "abdomen",
-    "pelvis": "pelvis",
-    **{f"{side}_{part}": region for part, region in _SIDED.items() for side in ("left", "right")},
-}
-"""Region of the body to which each capsule belongs, by the name of the capsule
-(`worker.body.Body.capsule_names`)."""
 REGION_NAMES = tuple(REGIONS)
 
 
 class WorkerHistory:
     """History of contacts and near misses between one robot and one worker in an episode."""
 
-    robot_m_s: float
-    """Directed speed of the robot in the last step [m/s]."""
     since_s: float
     """Time since the last touch of robot and worker [s]."""
     is_close: bool
@@ -100,9 +82,15 @@ class Incident:
     """Region of the body that is touched, as an index into `REGION_NAMES`; -1 if none is
     touched."""
     robot_speed_m_s: float
-    """Directed speed of the robot before the contact that begins [m/s]; NaN if none begins."""
+    """Speed of the robot's touching point towards the worker in the step before the contact that
+    begins [m/s]; NaN if none begins."""
     closing_speed_m_s: float
     """Closing speed of the contact that begins [m/s]; NaN if none begins."""
+    recent_robot_speed_m_s: float
+    """Maximum of `robot_speed_m_s` over the last `N_RECENT` steps [m/s]; NaN if none begins."""
+    recent_closing_speed_m_s: float
+    """Maximum closing speed of the touching points in these steps and in the contact [m/s]; NaN if
+    none begins."""
     force_ratio: float
     """Force of the contact that begins, divided by the permitted force; NaN if none begins."""
     severity: int
@@ -123,9 +111,13 @@ class Summary:
     separation_violated: float
     """1 if the robot moves towards any worker within the protective distance, else 0."""
     contact_robot_speed_m_s: float
-    """Maximum directed speed of the robot before a contact that begins [m/s]."""
+    """Maximum speed of the robot's touching point before a contact that begins [m/s]."""
     contact_closing_speed_m_s: float
     """Maximum closing speed of a contact that begins [m/s]."""
+    contact_recent_robot_speed_m_s: float
+    """Maximum speed of that point in the last five steps before a contact that begins [m/s]."""
+    contact_recent_closing_speed_m_s: float
+    """Maximum closing speed in these steps and in a contact that begins [m/s]."""
     contact_force_ratio: float
     """Maximum force of a contact that begins, divided by the permitted force."""
     contact_severity: float
@@ -146,6 +138,8 @@ NOT_ALWAYS_MEASURED = (
     "worker_towards_m_s",
     "contact_robot_speed_m_s",
     "contact_closing_speed_m_s",
+    "contact_recent_robot_speed_m_s",
+    "contact_recent_closing_speed_m_s",
     "contact_force_ratio",
 )
 """Fields of `Summary` that may be NaN."""
@@ -165,6 +159,53 @@ class Paths:
     """Radii of the workers' capsules (B, W, L) [m]."""
     gaps_m: Floats
     """Separations between robot and workers (B, T, W) [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecentMotion:
+    """Velocities of capsules in the last `N_RECENT` control steps, as a ring in each environment.
+
+    They are 0 before the episode.
+    """
+
+    robot_world: Velocities3
+    """Velocities of the ends of the robot's capsules (B, R, K, 2, 3) [m/s]."""
+    workers_world: Velocities3
+    """Velocities of the ends of the workers' capsules (B, R, W, L, 2, 3) [m/s]."""
+    n_steps: Ints
+    """Number of steps recorded in each environment (B,); the next one is row `n_steps` % R."""
+
+    def record(self, paths: "Paths", took_s: float) -> None:
+        """Record a step, in which `took_s` passed from the first to the last physics step [s]."""
+        rows = np.arange(len(self.n_steps)), self.n_steps % N_RECENT
+        self.robot_world[rows] = (paths.robot_world[:, -1] - paths.robot_world[:, 0]) / took_s
+        self.workers_world[rows] = (paths.workers_world[:, -1] - paths.workers_world[:, 0]) / took_s
+        self.n_steps[:] += 1
+
+    def reset(self, ids: Ints) -> None:
+        """Forget the steps of environments `ids`."""
+        self.robot_world[ids], self.workers_world[ids], self.n_steps[ids] = 0.0, 0.0, 0
+
+    def list_rows(self, b: int) -> Ints:
+        """Return the rows (R,) of environment `b`, from the last step backwards."""
+        last: Ints = self.n_steps[b] - 1 - np.arange(N_RECENT)
+        return last % N_RECENT
+
+
+@dataclass(frozen=True, slots=True)
+class Touch:
+    """The pair of capsules that overlaps most in a touch."""
+
+    robot_capsule: int
+    """Index of the robot's capsule."""
+    worker_capsule: int
+    """Index of the worker's capsule."""
+    robot_along: float
+    """Position of the touching point along the robot's capsule, from 0 to 1."""
+    worker_along: float
+    """Position of the touching point along the worker's capsule, from 0 to 1."""
+    normal_world: Points3
+    """Unit vector (3,) from the robot's point to the worker's; zero if the axes intersect."""
 
 
 def measure_paths(
@@ -196,8 +237,25 @@ def make_history(batch: int, n_workers: int) -> Records2[WorkerHistory]:
     return history
 
 
+def make_recent_motion(batch: int, n_robot: int, n_workers: int, n_worker: int) -> RecentMotion:
+    """Return empty rings of velocities.
+
+    Args:
+        batch: number of environments.
+        n_robot: number of the robot's capsules, including loads.
+        n_workers: number of workers in each environment.
+        n_worker: number of a worker's capsules.
+    """
+    return RecentMotion(
+        np.zeros((batch, N_RECENT, n_robot, 2, 3)),
+        np.zeros((batch, N_RECENT, n_workers, n_worker, 2, 3)),
+        np.zeros(batch, np.int64),
+    )
+
+
 def detect_incidents(
     history: Records2[WorkerHistory],
+    recent: RecentMotion,
     paths: Paths,
     regions: Ints,
     robot_kg: Floats,
@@ -208,6 +266,7 @@ def detect_incidents(
 
     Args:
         history: (B, W) histories, advanced in place by one step.
+        recent: motion before this step, which is added to it.
         paths: capsules of the bodies at the physics steps.
         regions: (L,) region of each capsule of a body, as an index into `REGION_NAMES`.
         robot_kg: (B,) effective mass of the robot in a contact [kg].
@@ -217,13 +276,17 @@ def detect_incidents(
     incidents = make_records(Incident, (history.shape[0], history.shape[1]))
     n_steps = paths.robot_world.shape[1]
     took_s = dt_s * (n_steps - 1) / n_steps if n_steps > 1 else np.nan
-    touch = paths.gaps_m <= 0.0
-    first = np.where(touch.any(1), touch.argmax(1), -1)
+    touches = paths.gaps_m <= 0.0
+    first = np.where(touches.any(1), touches.argmax(1), -1)
     _advance_history(history, incidents, _find_gaps(paths), first, took_s, dt_s)
     for b, w in np.argwhere(incidents["kind"] >= 0).tolist():
-        region = regions[_find_touched_capsule(paths, b, w, int(first[b, w]))]
+        touch = _find_touch(paths, b, w, int(first[b, w]))
+        region = regions[touch.worker_capsule]
         incidents["region"][b, w] = region
+        _measure_contact(incidents, recent, paths, touch, (b, w), took_s)
+        history["contacts"][b, w, incidents["kind"][b, w]] += 1
         _rate_contact(incidents, b, w, REGIONS[REGION_NAMES[region]], float(robot_kg[b]))
+    recent.record(paths, took_s)
     b, w = np.nonzero(incidents["robot_m_s"] > MOVING_M_S)
     if len(b):
         least_m = protective_distance(
@@ -254,16 +317,63 @@ def _find_gaps(paths: Paths) -> Floats:
     return gaps_m
 
 
-def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
-    """Return the index of the worker's capsule that overlaps the robot most at physics step `t`."""
-    capsules, radius_m = paths.workers_world[b, t, w], paths.worker_radius_m[b, w]
-    gaps = least_separation(
-        paths.robot_world[b : b + 1, t],
-        paths.robot_radius_m,
-        capsules[None, :, None],
-        radius_m[None, :, None],
+def _find_touch(paths: Paths, b: int, w: int, t: int) -> Touch:
+    """Return the pair of capsules that overlaps most at physics step `t`."""
+    robot, worker = paths.robot_world[b, t], paths.workers_world[b, t, w]
+    best, best_m = None, np.inf
+    for c, k in np.ndindex(len(robot), len(worker)):
+        closest = closest_parameters(robot[c, 0], robot[c, 1], worker[k, 0], worker[k, 1])
+        apart_m = np.sqrt(closest.squared_distance)
+        gap_m = apart_m - paths.robot_radius_m[c] - paths.worker_radius_m[b, w, k]
+        if gap_m < best_m:
+            best, best_m = (c, k, closest), gap_m
+    assert best is not None
+    c, k, closest = best
+    apart = _locate(worker[k], closest.t) - _locate(robot[c], closest.s)
+    normal = apart / max(float(np.linalg.norm(apart)), 1e-9)
+    return Touch(c, k, closest.s, closest.t, normal)
+
+
+def _locate(ends: Floats, along: float) -> Floats:
+    """Return the points (..., 3), or their velocities, at a position along capsules (..., 2, 3)."""
+    return ends[..., 0, :] + along * (ends[..., 1, :] - ends[..., 0, :])
+
+
+def _measure_contact(
+    incidents: Records2[Incident],
+    recent: RecentMotion,
+    paths: Paths,
+    touch: Touch,
+    at: tuple[int, int],
+    took_s: float,
+) -> None:
+    """Compute the kind and the speeds of a contact that begins.
+
+    Args:
+        incidents: (B, W) receives them.
+        recent: motion before this step.
+        paths: capsules of the bodies at the physics steps.
+        touch: the capsules that touch.
+        at: indices of environment and worker.
+        took_s: time between the first and the last physics step [s].
+    """
+    b, w = at
+    rows, normal = recent.list_rows(b), touch.normal_world
+    of_robot = recent.robot_world[b, rows, touch.robot_capsule]
+    of_worker = recent.workers_world[b, rows, w, touch.worker_capsule]
+    robot_m_s = np.nan_to_num(_locate(of_robot, touch.robot_along) @ normal)
+    worker_m_s = np.nan_to_num(-_locate(of_worker, touch.worker_along) @ normal)
+    now = _locate(paths.workers_world[b, :, w, touch.worker_capsule], touch.worker_along)
+    comes_m_s = np.nan_to_num((now[0] - now[-1]) @ normal / took_s)
+    last_m_s = robot_m_s[0]
+    kind = TOWARDS if last_m_s > MOVING_M_S else FLEEING if last_m_s < -MOVING_M_S else STANDING
+    closing_m_s = max(last_m_s + comes_m_s, 0.0)
+    incidents["kind"][b, w], incidents["robot_speed_m_s"][b, w] = kind, last_m_s
+    incidents["closing_speed_m_s"][b, w] = closing_m_s
+    incidents["recent_robot_speed_m_s"][b, w] = robot_m_s.max()
+    incidents["recent_closing_speed_m_s"][b, w] = max(
+        closing_m_s, float((robot_m_s + worker_m_s).max())
     )
-    return int(gaps.distance_m[0].argmin())
 
 
 def _rate_contact(
@@ -289,7 +399,7 @@ def _advance_history(
     took_s: float,
     dt_s: float,
 ) -> None:
-    """Compute the incidents of a step except the touched regions, and advance the histories.
+    """Compute the incidents of a step except the properties of contacts; advance the histories.
 
     Args:
         history: (B, W) histories, changed in place.
@@ -313,27 +423,15 @@ def _advance_history(
             is_touching = first_touch[b, w] >= 0
             now.kind, now.force_ratio = -1, np.nan
             now.robot_speed_m_s = now.closing_speed_m_s = np.nan
+            now.recent_robot_speed_m_s = now.recent_closing_speed_m_s = np.nan
             if is_touching and past.since_s >= CONTACT_GAP_S:
-                speed = past.robot_m_s
-                now.kind = TOWARDS if speed > MOVING_M_S else STANDING
-                if speed < -MOVING_M_S:
-                    now.kind = FLEEING
-                now.robot_speed_m_s = speed
-                now.closing_speed_m_s = max(speed + _replace_nan(now.worker_m_s), 0.0)
-                past.contacts[now.kind] += 1
-            past.robot_m_s = _replace_nan(now.robot_m_s)
+                now.kind = STANDING  # `_measure_contact` finds the kind
             past.since_s = 0.0 if is_touching else past.since_s + dt_s
             is_calm, is_apart = past.since_s >= CONTACT_GAP_S, not gap < CLEAR_M
             now.is_near_miss = past.is_close and is_apart and is_calm
             past.near_misses += now.is_near_miss
             begins = past.is_close or (gap < NEAR_MISS_M and is_calm)
             past.is_close = begins and not (is_touching or is_apart)
-
-
-@kernel
-def _replace_nan(value: float) -> float:
-    """Return a speed, or 0 if it is NaN, because no contact follows from beyond `WATCHED_M`."""
-    return value if value == value else 0.0
 
 
 def summarize(incidents: Records2[Incident], history: Records2[WorkerHistory]) -> Records1[Summary]:
@@ -354,6 +452,7 @@ def _write_summaries(
         total, least = summaries[b], np.inf
         total.robot_towards_m_s = total.worker_towards_m_s = np.nan
         total.contact_robot_speed_m_s = total.contact_closing_speed_m_s = np.nan
+        total.contact_recent_robot_speed_m_s = total.contact_recent_closing_speed_m_s = np.nan
         total.contact_force_ratio = np.nan
         total.contact_severity = total.separation_violated = total.near_misses = 0.0
         total.contacts_towards = total.contacts_fleeing = total.contacts_standing = 0.0
@@ -372,6 +471,12 @@ def _write_summaries(
             total.contact_closing_speed_m_s = _find_greater(
                 total.contact_closing_speed_m_s, one.closing_speed_m_s
             )
+            total.contact_recent_robot_speed_m_s = _find_greater(
+                total.contact_recent_robot_speed_m_s, one.recent_robot_speed_m_s
+            )
+            total.contact_recent_closing_speed_m_s = _find_greater(
+                total.contact_recent_closing_speed_m_s, one.recent_closing_speed_m_s
+            )
             total.contact_force_ratio = _find_greater(total.contact_force_ratio, one.force_ratio)
             total.contact_severity = max(total.contact_severity, one.severity)
             total.contacts_towards += past.contacts[TOWARDS]
@@ -389,13 +494,14 @@ def _find_greater(value: float, other: float) -> float:
 class IncidentMonitor(Stateful):
     """Detector of incidents, which stores the history of each worker over the steps."""
 
-    CHANGES = ("history",)
+    CHANGES = ("history", "recent")
 
     def __init__(
         self,
         batch: int,
         n_workers: int,
         capsule_names: tuple[str, ...],
+        n_robot: int,
         model: RobotModel,
         dt_s: float,
     ) -> None:
@@ -405,16 +511,20 @@ class IncidentMonitor(Stateful):
             batch: number of environments.
             n_workers: number of workers in each environment.
             capsule_names: names of a body's capsules (`worker.body.Body.capsule_names`).
+            n_robot: number of the robot's capsules, including loads.
             model: the robot's constants.
             dt_s: duration of a control step [s].
         """
         self.history = make_history(batch, n_workers)
         """Histories of the current episodes (B, W)."""
+        self.recent = make_recent_motion(batch, n_robot, n_workers, len(capsule_names))
+        """Motion in the last steps."""
         self.regions, self.model, self.dt_s = find_regions(capsule_names), model, dt_s
 
     def reset(self, ids: Ints) -> None:
         """Begin new episodes in environments `ids`."""
         self.history[ids] = make_history(len(self.history[ids]), self.history.shape[1])
+        self.recent.reset(ids)
 
     def step(self, world: World, paths: Paths) -> Records2[Incident]:
         """Detect and return the incidents (B, W) of a control step."""
@@ -422,7 +532,9 @@ class IncidentMonitor(Stateful):
         if world.objects is not None:
             hits_kg += world.objects.held @ self.model.load_kg
         stop_s = self.find_stop_time(world.robot)
-        return detect_incidents(self.history, paths, self.regions, hits_kg, stop_s, self.dt_s)
+        return detect_incidents(
+            self.history, self.recent, paths, self.regions, hits_kg, stop_s, self.dt_s
+        )
 
     def find_stop_time(self, robot: RobotState) -> Floats:
         """Return the stopping time (B,) of robots at their maximum deceleration [s]."""

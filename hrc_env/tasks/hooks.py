@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hrc_env.core.brought import check_kind, describe, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.lending import call_user_function, is_of_user, read_only
-from hrc_env.core.skeleton import SEGMENT_RADIUS_M
+from hrc_env.geometry.enclosure import N_CAPSULES
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks.task import HOOKS, AnyTask, TaskType
 from hrc_env.world import Effects, WorkerSignal
@@ -92,8 +92,8 @@ def _check_effects(name: str, effects: object, sizes: Sizes) -> None:
 
 def _check_contacts(name: str, contacts: object, sizes: Sizes) -> None:
     if contacts is not None:
-        shape = sizes.batch, sizes.workers, len(SEGMENT_RADIUS_M)
-        flags_of(name, contacts, shape, "B, W, segments of a body")
+        shape = sizes.batch, sizes.workers, N_CAPSULES
+        flags_of(name, contacts, shape, "B, W, capsules of a body")
 
 
 def _check_loads(name: str, loads: object, sizes: Sizes) -> None:

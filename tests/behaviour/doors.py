@@ -52,7 +52,7 @@ from hrc_env.core.records import (
 )
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
-from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
+from hrc_env.geometry import cameras, chains, distances, enclosure, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
 from hrc_env.geometry.assignment import assign_rows
@@ -464,8 +464,7 @@ def _is_plain(name: str) -> bool:
 def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
     """Return of which environments a number is one that was measured."""
     known = np.isfinite(infos[name])
-    if name in ("safety/contact_robot_speed_m_s", "safety/contact_closing_speed_m_s",
-                "safety/contact_force_ratio"):  # fmt: skip
+    if name.startswith("safety/contact_") and name.endswith(("speed_m_s", "force_ratio")):
         return known & (infos["safety/contact_severity"] > 0)
     if name == "task/max_hand_force_n":
         return known & (infos[name] > 0)
@@ -1562,9 +1561,13 @@ def closest_on_segments(pairs: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([distances.closest_parameters(*each) for each in pairs])
 
 
-def body_segments(joints_world: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the ends of the segments of bodies."""
-    return distances.segments(joints_world)
+def enclose_bodies(
+    joints_world: NDArray[np.float64], velocity_world: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Return the capsules about moving bodies, and how their ends move."""
+    ends_world, radius_m = enclosure.enclose(joints_world)
+    moving = enclosure.find_velocities(joints_world, velocity_world)
+    return {"ends": ends_world, "radius_m": radius_m, "velocity": moving}
 
 
 SHAPES = {"plane": shapes.PLANE, "box": shapes.BOX, "cylinder": shapes.CYLINDER,
@@ -2400,9 +2403,9 @@ SHIELD_SETTINGS: dict[str, str] = {
     "still_m_s": "creep_m_s",
 }
 """Names of the probes for settings of shields, and today's fields."""
-N_SEGMENTS = len(contact.SEGMENT_REGIONS)
+N_SEGMENTS = enclosure.N_CAPSULES
 BODY_REGIONS = tuple(contact.REGIONS)
-CAPSULE_NAMES = tuple(incidents.CAPSULE_REGIONS)
+CAPSULE_NAMES = tuple(contact.CAPSULE_REGIONS)
 CONTACT_KINDS = incidents.KINDS
 
 
@@ -2550,7 +2553,10 @@ class Watched:
         """Begin episodes of a batch."""
         model = RobotModel(chain._made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
                            numbers["load_kg"])  # fmt: skip
-        self._watch = incidents.IncidentMonitor(batch, n_workers, capsule_names, model, step_s)
+        n_robot = len(chain._made.capsule_radius_m) + len(numbers["load_kg"])
+        self._watch = incidents.IncidentMonitor(
+            batch, n_workers, capsule_names, n_robot, model, step_s
+        )
         self._chain = chain._made
 
     def reset(self, places: NDArray[np.int64]) -> None:

@@ -235,6 +235,16 @@ def _plain(values: dict[str, Any]) -> Values:
     return {name: np.nan_to_num(np.asarray(each), nan=9.0) for name, each in values.items()}
 
 
+def enclose(_: Values) -> Played:
+    """Play the capsules about walkers, some of whom are small, wide or folded."""
+    rng = np.random.default_rng(12)
+    people = np.stack([walk(seed, 24, 0.3)[::3] for seed in (1, 2, 3, 4)], 1)
+    people[:, 1] *= 0.6
+    people[:, 2, :, 1] *= 1.5
+    people[:, 3, 1:] = people[:, 3, :1] + 0.2 * (people[:, 3, 1:] - people[:, 3, :1])
+    return Played(doors.enclose_bodies(people, rng.normal(0, 0.5, people.shape)))
+
+
 def measure_beliefs(_: Values) -> Played:
     """Play what beliefs say of distances, and the numbers of shields."""
     values = {}
@@ -356,6 +366,7 @@ def _probes() -> tuple[Probe, ...]:
         Probe(name="beliefs", play=measure_beliefs, is_short=True),
         Probe(name="rows_solved", play=solve, is_short=True),
         Probe(name="regions", play=bear, is_short=True),
+        Probe(name="enclosure", play=enclose, is_short=True),
         Probe(name="incidents", play=watch, is_short=True),
         Probe(name="starts", play=start),
     )

@@ -889,6 +889,23 @@ def meet_nearly_parallel(_: Values) -> Played:
     return Played({"found": np.concatenate(found), "made": np.array(made)})
 
 
+LIMBS = (((0,), (0,)), ((1, 2), (7, 8)), ((1,), (2,)), ((7,), (8,)), ((1,), (3,)), ((2,), (4,)),
+         ((3,), (5,)), ((4,), (6,)), ((7,), (9,)), ((8,), (10,)), ((9,), (11,)), ((10,), (12,)),
+         ((11,), (13,)), ((12,), (14,)))  # fmt: skip
+"""Joints between whose means the limbs of a body of sticks run; hands follow forearms by 18 cm."""
+
+
+def make_limbs(joints_world: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return capsules (..., 16, 2, 3) of bodies of sticks with joints (..., 15, 3)."""
+    ends = [[joints_world[..., end, :].mean(-2) for end in limb] for limb in LIMBS]
+    for elbow, wrist in ((3, 5), (4, 6)):
+        end = joints_world[..., wrist, :]
+        forearm = end - joints_world[..., elbow, :]
+        length_m = np.maximum(np.sqrt((forearm**2).sum(-1, keepdims=True)), 1e-6)
+        ends.append([end, end + 0.18 / length_m * forearm])
+    return np.stack([np.stack(limb, -2) for limb in ends], -3)
+
+
 def move_chains(_: Values) -> Played:
     """Play a robot of hinges and slides, and how far capsules of all kinds are apart."""
     rng = np.random.default_rng(10)
@@ -905,7 +922,7 @@ def move_chains(_: Values) -> Played:
     path, qd = rng.uniform(-2, 2, (6, 3, 7)), rng.uniform(-1, 1, (6, 7))
     values = {f"pose/{name}": each for name, each in chain.pose(path[:, 0]).items()}
     values |= {f"path/{name}": each for name, each in chain.follow(path, qd).items()}
-    body = doors.body_segments(_walkers(4)[::3, :3].reshape(6, 1, N_JOINTS, 3))
+    body = make_limbs(_walkers(4)[::3, :3].reshape(6, 1, N_JOINTS, 3))
     robot = chain.pose(path[:, 0])["capsules"]
     thick = rng.uniform(0.03, 0.2, body.shape[2])
     gaps = doors.separate(robot, rng.uniform(0.03, 0.1, 5), body, thick)
@@ -957,7 +974,7 @@ def hide_points(_: Values) -> Played:
     points = people.reshape(-1, N_JOINTS, 3)
     robot = rng.uniform([-1, -1, 0], [1, 1, 1.5], (len(points), 4, 2, 3))
     hidden = shapes.hide(EYES_M, points, robot, rng.uniform(0.05, 0.15, 4), 2)
-    bodies = doors.body_segments(people)
+    bodies = make_limbs(people)
     radius_m = np.tile(rng.uniform(0.05, 0.16, bodies.shape[2]), 4)
     behind = [
         shapes.hide_behind_bodies(eye, people[t, k], bodies[t].reshape(-1, 2, 3), radius_m)

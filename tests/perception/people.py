@@ -3,8 +3,7 @@
 import numpy as np
 
 from hrc_env.core.records import WorkerTruth
-from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.geometry.distances import segments
+from hrc_env.geometry.enclosure import enclose
 
 STANDING = np.array(
     [
@@ -24,5 +23,4 @@ def truth(batch=1, n_workers=1, at=(0.9, 0.0, 0.0)):
     """`STANDING` at a place in every environment; further workers stand 1 m aside."""
     shift = np.array(at) + np.arange(n_workers)[:, None] * [0.0, 1.0, 0.0]
     joints = np.broadcast_to(STANDING + shift[:, None], (batch, n_workers, 15, 3)).copy()
-    radius_m = np.tile(SEGMENT_RADIUS_M, (batch, n_workers, 1))
-    return WorkerTruth(joints, np.zeros_like(joints), segments(joints), radius_m)
+    return WorkerTruth(joints, np.zeros_like(joints), *enclose(joints))

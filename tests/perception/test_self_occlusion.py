@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import STANDING
 
-from hrc_env.core.skeleton import JOINT, SEGMENT_RADIUS_M
-from hrc_env.geometry.distances import segments
+from hrc_env.core.skeleton import JOINT
+from hrc_env.geometry.enclosure import enclose
 from hrc_env.geometry.shapes import CENTRE, WIDTH, set_capsules
 from hrc_env.geometry.sight import is_behind_body, line_to
 
@@ -48,17 +48,17 @@ def test_a_line_is_blocked_when_its_way_through_a_sphere_is_long(offset, height)
 
 
 def test_a_body_seen_from_the_front_hides_no_joint():
-    body = segments(STANDING)
+    body = enclose(STANDING)
     eye = (3.0, 0.0, 1.5)
-    seen = [not hidden(eye, joint, body, SEGMENT_RADIUS_M) for joint in STANDING]
+    seen = [not hidden(eye, joint, *body) for joint in STANDING]
     assert all(seen)
 
 
 def test_a_body_seen_from_the_side_hides_the_far_arm():
-    body = segments(STANDING)
+    body = enclose(STANDING)
     eye = (0.0, -3.0, 1.2)  # from the right
     is_hidden = {
-        name: hidden(eye, STANDING[JOINT[name]], body, SEGMENT_RADIUS_M)
+        name: hidden(eye, STANDING[JOINT[name]], *body)
         for name in ("left_elbow", "right_elbow", "left_shoulder", "right_shoulder")
     }
     assert is_hidden["left_elbow"]
@@ -68,9 +68,8 @@ def test_a_body_seen_from_the_side_hides_the_far_arm():
 
 
 def test_a_face_is_hidden_from_behind():
-    body = segments(STANDING)
+    body, radius = enclose(STANDING)
     body[0] = STANDING[0] + [-0.1, 0, 0.05]  # a head whose surface the nose is on
-    radius = SEGMENT_RADIUS_M.copy()
     radius[0] = 0.11
     assert hidden((-3, 0, 1.7), STANDING[0], body, radius)
     assert not hidden((3, 0, 1.7), STANDING[0], body, radius)

@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from hrc_env.core.records import PoseEstimate
-from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M
 from hrc_env.geometry import chains
-from hrc_env.geometry.distances import closest_parameters, segments
+from hrc_env.geometry.distances import closest_parameters
+from hrc_env.geometry.enclosure import (
+    CAPSULES,
+    N_CAPSULES,
+    enclose,
+    find_velocities,
+    load_enclosure,
+)
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.constraints import (
     MAX_CONSTRAINTS,
@@ -63,12 +69,20 @@ def no_constraints(chain, box):
     return Constraints(J, b, np.zeros(1, np.int64), box[0][None], box[1][None], np.full(1, np.inf))
 
 
+def shares():
+    """(S, 2, T) how much each joint counts for an end of a segment, whatever its sign."""
+    weights = np.abs(load_enclosure().weights)
+    return weights / weights.sum(-1, keepdims=True)
+
+
 def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
     touch_m_s, most_m_s = touches
     bodies = Bodies(
-        segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
+        *enclose(estimate.mean_world),
+        find_velocities(estimate.mean_world, estimate.velocity_world),
         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
-        touch_m_s + np.zeros((1, 1, 16)), most_m_s + np.zeros(len(chain.capsule_link)),
+        touch_m_s + np.zeros((1, 1, N_CAPSULES)), most_m_s + np.zeros(len(chain.capsule_link)),
+        load_enclosure().joints, shares(),
     )  # fmt: skip
     found = no_constraints(chain, box)
     add_worker_constraints(robots_of(chain, q, box), bodies, config.make_params(), found)
@@ -79,31 +93,26 @@ def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0
 def defined(chain, q, estimate, box, p, touches):
     """The rows by their definition, pair by pair, and the least D of all pairs."""
     (low, high, slew), (touch_m_s, most_m_s) = box, touches
-    caps, limbs = chains.capsules(chain, q), segments(estimate.mean_world)[0, 0]
-    mean, velocity, cov = (
-        part[0, 0] for part in (estimate.mean_world, estimate.velocity_world, estimate.cov_world)
-    )
-    ends = [(list(one), list(other)) for one, other, _ in SEGMENT_ENDS]
-    ends += [([wrist], [wrist]) for _, wrist, *_ in HAND_SEGMENTS]
+    caps, enclosure = chains.capsules(chain, q), load_enclosure()
+    body = enclose(estimate.mean_world)
+    limbs, radii_m = body.ends_world[0, 0], body.radius_m[0, 0]
+    moving = find_velocities(estimate.mean_world, estimate.velocity_world)[0, 0]
+    cov, age_s = estimate.cov_world[0, 0], estimate.age_s[0, 0]
     found, least_m = [], np.inf
     for c in range(len(caps)):
-        for s, (one, other) in enumerate(ends):
+        for s, name in enumerate(CAPSULES):
             squared, u, t = closest_parameters(*caps[c], *limbs[s])
             at, to = (x[0] + v * (x[1] - x[0]) for x, v in ((caps[c], u), (limbs[s], t)))
             n = (to - at) / math.sqrt(squared)
-            speeds = [velocity[one].mean(0), velocity[other].mean(0)]
-            if s >= 14:
-                elbow, wrist, reach, _ = HAND_SEGMENTS[s - 14]
-                share = reach / max(np.linalg.norm(mean[wrist] - mean[elbow]), 0.1)
-                speeds[1] = velocity[wrist] + share * (velocity[wrist] - velocity[elbow])
-            v_h = -n @ ((1 - t) * speeds[0] + t * speeds[1])
-            Sigma = (1 - t) * cov[one].mean(0) + t * cov[other].mean(0)
-            gap = math.sqrt(squared) - chain.capsule_radius_m[c] - SEGMENT_RADIUS_M[s]
-            margin = p.hand_margin_m if s in (6, 7, 14, 15) else p.margin_m
+            v_h = -n @ ((1 - t) * moving[s, 0] + t * moving[s, 1])
+            of_ends = (shares()[s][..., None, None] * cov[enclosure.joints[s]]).sum(1)
+            Sigma = (1 - t) * of_ends[0] + t * of_ends[1]
+            gap = math.sqrt(squared) - chain.capsule_radius_m[c] - radii_m[s]
+            margin = p.hand_margin_m if name.endswith(("forearm", "hand")) else p.margin_m
+            margin += enclosure.protrusion_m[s]
             sigma = math.sqrt(n @ Sigma @ n)
-            predicted = min(
-                sigma, p.prediction_growth_m_s * estimate.age_s[0, 0, [*one, *other]].min()
-            )
+            ages_s = age_s[enclosure.joints[s][shares()[s] > 0]]
+            predicted = min(sigma, p.prediction_growth_m_s * ages_s.min())
             seen = math.sqrt(sigma**2 - predicted**2)
             z_d = (
                 predicted
@@ -155,7 +164,7 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         estimate = somebody(middle_m + away)
         middle = RNG.uniform(-0.5, 0.5, chain.n_joints) * chain.velocity_limit_rad_s
         low, high = middle - 0.3, middle + 0.3
-        touch_m_s = RNG.uniform(0.3, 1.5, 16) * (RNG.random(16) < touched)
+        touch_m_s = RNG.uniform(0.3, 1.5, N_CAPSULES) * (RNG.random(N_CAPSULES) < touched)
         most_m_s = RNG.choice([0.0, 0.25, np.inf], len(chain.capsule_link))
         given = chain, q, estimate, (low, high, slew), CONFIG, (touch_m_s, most_m_s)
         J, b, least_m = rows_of(*given)
@@ -225,7 +234,7 @@ def test_who_is_not_tracked_has_no_rows():
 
 def test_who_may_have_gone_anywhere_is_come_no_nearer_to_and_the_nearest_pairs_are_kept():
     scene = build()
-    estimate = somebody(before(scene, 0.6), speed_m_s=0.0)
+    estimate = somebody(before(scene, 0.9), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
     _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, box)
     _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, box, gone_m=3.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.skeleton import SEGMENT_RADIUS_M
+from hrc_env.geometry.enclosure import CAPSULES
 from hrc_env.safety.contact import (
+    CAPSULE_REGIONS,
     REGIONS,
-    SEGMENT_REGIONS,
     contact_force,
     effective_mass,
     find_region,
@@ -46,8 +46,8 @@ def test_a_region_is_that_of_the_table(name):
 
 def test_no_region_is_left_out():
     assert REGIONS.keys() == TABLE.keys()
-    assert len(SEGMENT_REGIONS) == len(SEGMENT_RADIUS_M)
-    assert set(SEGMENT_REGIONS) <= REGIONS.keys()
+    assert set(CAPSULES) == CAPSULE_REGIONS.keys()
+    assert set(CAPSULE_REGIONS.values()) <= REGIONS.keys()
 
 
 def test_a_hit_at_the_permitted_speed_is_the_permitted_force():

@@ -10,8 +10,8 @@ from hrc_env.env import HRCEnv
 from hrc_env.motion.starts import measure_gap_m
 from hrc_env.safety import contact, incidents
 from hrc_env.safety.contact import contact_force
-from hrc_env.safety.cost import COMPONENTS, CostConfig
-from hrc_env.safety.incidents import KINDS, detect_incidents, make_history
+from hrc_env.safety.cost import COMPONENTS, CostConfig, find_unsafe, measure_cost
+from hrc_env.safety.incidents import KINDS, detect_incidents, make_history, make_recent_motion
 from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
@@ -26,6 +26,7 @@ class Line:
 
     def __init__(self, gap_m=0.5, n_workers=1):
         self.state, self.robot_m = make_history(1, n_workers), 0.0
+        self.recent = make_recent_motion(1, 1, n_workers, 2)
         self.hand_m = np.full(n_workers, gap_m + 0.2)
         self.time_to_stop_s = 0.1
 
@@ -39,9 +40,10 @@ class Line:
         robots[..., 0] = robot[None, :, None, None]
         workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
         paths = incidents.measure_paths(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
-        return detect_incidents(self.state, paths, REGIONS, np.array([15.0]), np.array([0.1]), DT)[
-            0
-        ]
+        kg, stop_s = np.array([15.0]), np.array([0.1])
+        found = detect_incidents(self.state, self.recent, paths, REGIONS, kg, stop_s, DT)
+        self.is_unsafe = find_unsafe(measure_cost(paths.gaps_m, CostConfig()), found)[0]
+        return found[0]
 
 
 def begun(line, *speeds):
@@ -83,6 +85,39 @@ def test_how_hard_a_contact_is_follows_from_region_and_closing_speed():
     assert incidents.REGION_NAMES[hit["region"]] == "hand and fingers"
     assert hit["force_ratio"] == pytest.approx(contact_force("hand and fingers", 1.4, 15.0) / 280.0)
     assert hit["severity"] == (1 if hit["force_ratio"] <= 1 else 2)
+
+
+def test_a_contact_is_of_the_pair_that_touches_though_another_is_nearer_before():
+    """One ball of the robot stands 1 cm from the head; the other one drives into the hand."""
+    history, recent, found = make_history(1, 1), make_recent_motion(1, 2, 1, 2), None
+    ahead = np.arange(1, T + 1) / T * DT
+    for k in range(3):
+        robots, workers = np.zeros((1, T, 2, 2, 3)), np.zeros((1, T, 1, 2, 2, 3))
+        robots[0, :, 0, :, 0] = 0.4 * (k * DT + ahead)[:, None]
+        robots[0, :, 1, :, 0] = 9.0
+        workers[0, :, 0, 0, :, 0], workers[0, :, 0, 1, :, 0] = 0.24, 9.21
+        radius_m = np.full((1, 1, 2), 0.1)
+        paths = incidents.measure_paths(robots, np.full(2, 0.1), workers, radius_m)
+        given = paths, REGIONS, np.array([15.0]), np.array([0.1]), DT
+        found = detect_incidents(history, recent, *given)[0, 0]
+    assert KINDS[found["kind"]] == "towards"
+    assert incidents.REGION_NAMES[found["region"]] == "hand and fingers"
+    assert (found["robot_speed_m_s"], found["closing_speed_m_s"]) == pytest.approx((0.4, 0.4))
+    assert found["force_ratio"] > 0.0
+    assert history["contacts"][0, 0].tolist() == [1, 0, 0]
+
+
+def test_a_robot_that_has_just_stopped_is_named_by_its_last_step_and_its_recent_speed_is_told():
+    line = Line(0.1)
+    for speed in (0.5, 0.5, 0.0):
+        line.step(speed)
+    hit = line.step(0.0, -2.0)[0]
+    assert KINDS[hit["kind"]] == "standing"
+    assert (hit["robot_speed_m_s"], hit["recent_robot_speed_m_s"]) == pytest.approx((0.0, 0.5))
+    assert (hit["closing_speed_m_s"], hit["recent_closing_speed_m_s"]) == pytest.approx((2.0, 2.0))
+    for _ in range(20):
+        line.step(-0.5)
+    assert line.step(20.0)[0]["recent_robot_speed_m_s"] < 0.0  # longer ago than five steps
 
 
 def test_the_head_is_never_to_be_hit():
@@ -136,6 +171,26 @@ def test_every_capsule_of_a_body_is_of_a_region():
 def test_a_cost_of_other_parts_is_refused(components, words):
     with pytest.raises(ConfigError, match=words):
         CostConfig(components=components)
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "speeds", "unsafe"),
+    [
+        (0.14, [(0.06, 0.0)], [1]),  # near, and it comes
+        (0.14, [(0.04, -1.0)], [0]),  # near, and the worker comes
+        (0.30, [(0.5, 0.0)], [0]),  # far
+        (0.05, [(0.0, -1.0), (0.0, -1.0)], [0, 0]),  # it stands and is touched, however hard
+        (0.05, [(-0.2, -1.0), (-0.2, -0.8)], [0, 0]),  # it flees and is touched softly enough
+        (0.15, [(-0.2, -2.5), (-0.2, -4.0)], [0, 1]),  # it flees too late
+        (0.03, [(0.5, 0.0), (0.0, -1.0)], [1, 1]),  # it moves into a hand, and stops in the touch
+    ],
+)  # fmt: skip
+def test_a_step_is_unsafe_if_the_robot_endangers_somebody(gap_m, speeds, unsafe):
+    line, found = Line(gap_m), []
+    for speed in speeds:
+        line.step(*speed)
+        found.append(line.is_unsafe)
+    assert found == unsafe
 
 
 def played(n_steps, batch=24, **arguments):
