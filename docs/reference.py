@@ -141,10 +141,10 @@ place for 3 times `tracker.lost_relaxation_s`.
 All slots also become unknown if several cameras repeatedly detect people whom no pose explains, as
 with a wrong calibration; `info["perception/miscalibrated"]` counts such cameras.
 
-`worker_blind` is the time since cameras last saw the worker, or saw that the slot is empty [s].
-With four cameras an empty room is known to be empty one step after the reset at `keypoints`, and a
-second after it at `pixels`, where cameras search every fifth step. At level `truth` no slot is
-unknown; at level `none` every slot is.
+`worker_unobserved_time` is the time since cameras last saw the worker, or saw that the slot is
+empty [s]. With four cameras an empty room is known to be empty one step after the reset at
+`keypoints`, and a second after it at `pixels`, where cameras search every fifth step. At level
+`truth` no slot is unknown; at level `none` every slot is.
 
 The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that
 a lost track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at
