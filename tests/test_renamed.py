@@ -10,6 +10,7 @@ import pytest
 
 import hrc_env
 from hrc_env import observations
+from hrc_env.__main__ import main
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import env_info
 from hrc_env.control import ControlConfig
@@ -69,6 +70,22 @@ def test_former_names_are_answered_wherever_settings_are_given():
         hrc_env.HRCEnv(faults=[{"kind": "lost", "cameras": ["all"], "from_s": 1.0}])
     with pytest.raises(ConfigError, match=r"cameras\.place_m is called cameras\.max_shift_m now"):
         hrc_env.HRCEnv(cameras=read_cameras(['{"place_m": 0.1}']))
+
+
+@pytest.mark.parametrize(
+    ("command", "former", "present"),
+    [("lab", "--folded", "--folded-network"), ("price", "--eyes", "--setups")],
+)
+def test_a_former_option_of_a_command_is_an_error_that_gives_the_present_one(
+    command, former, present, capsys
+):
+    assert main(["experiment", command, former, "heavy"]) == 2
+    assert f"The option {former} is called {present} now." in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["experiment", command, "--help"])
+    shown = capsys.readouterr().out
+    assert f"{present} " in shown
+    assert f"{former} " not in shown
 
 
 def test_a_former_component_of_the_cost_is_an_error_that_gives_the_present_one():
