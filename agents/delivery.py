@@ -127,7 +127,7 @@ class Deliverer:
         field = self._find_fields(place, terms["zone_from_base"], people)
         velocity = self._choose_velocity(place, speed, yaw, terms["zone_from_base"], field, people)
         driving = np.linalg.norm(velocity, axis=1, keepdims=True) > SLOW_M_S
-        turn = self._compute_turn(place, yaw, np.where(driving, velocity, terms["way_direction"]))
+        turn = self._compute_turn(place, yaw, np.where(driving, velocity, terms["path_direction"]))
         near_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
         waits = (near_m < STAY_M) | (np.linalg.norm(terms["zone_from_base"], axis=1) < NEAR_M)
         turn = np.where(waits & ~driving[:, 0], 0.0, turn)
@@ -236,7 +236,7 @@ class Deliverer:
 
 def _read_people(terms: dict[str, Array]) -> People:
     """Extract the estimated workers from the terms of an observation."""
-    n = len(terms["way_left"])
+    n = len(terms["remaining_path"])
     joints = terms["worker_joints_from_tool"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     moving = terms["worker_joints_velocity"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     known = (terms["worker_tracked"] > 0.5)[..., None]

@@ -13,7 +13,9 @@ from typing import NamedTuple
 
 from hrc_env.core.errors import CheckpointError, ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import from_mapping
+from hrc_env.core.renamed_keys import describe_renaming
 from hrc_env.core.results import Metric
+from hrc_env.observations import RENAMED, TermDict
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 from hrc_env.tasks.task import ancestor_of
 
@@ -181,7 +183,11 @@ def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
     ]
     theirs = {term.name: term for term in card.observation}
     ours = {term.name: term for term in list_terms(env_info)}
+    renamed = {name: RENAMED[name] for name in theirs.keys() & RENAMED.keys() - ours.keys()}
+    texts += [describe_renaming(TermDict.WHAT, name, renamed)[:-1] for name in sorted(renamed)]
     for name in [*theirs, *(ours.keys() - theirs.keys())]:
+        if name in {*renamed, *renamed.values()}:
+            continue
         if theirs.get(name) != ours.get(name):
             old, new = _describe_term(theirs.get(name)), _describe_term(ours.get(name))
             texts.append(f"its observation's {name} has {old}, but here {new}")

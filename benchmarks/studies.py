@@ -171,9 +171,9 @@ STUDIES: dict[str, Study] = {
     }),
     "lab": Study({
         "lab": Command(
-            EXPERIMENT + "lab --folded heavy", 12, PIXELS, ("lab",),
+            EXPERIMENT + "lab --folded-network heavy", 12, PIXELS, ("lab",),
             {"lab_figure_6.jpg": "figure_6.png"},
-            made=_find_experiment("lab", folded="heavy"),
+            made=_find_experiment("lab", folded_network="heavy"),
         ),
     }),
     "perception": Study({

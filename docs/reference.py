@@ -21,7 +21,20 @@ from docs.names import doc_of
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
 from hrc_env.core.docstrings import attribute_docs, field_docs, get_own_doc
-from hrc_env.core.infos import ALWAYS, ENTRIES, FAULT, OF_WORKERS, Entry
+from hrc_env.core.infos import (
+    ABSENT,
+    ACTIVITY,
+    ALWAYS,
+    BODY,
+    CONTACT_KIND,
+    CONTACT_REGION,
+    ENTRIES,
+    FAULT,
+    MISCALIBRATED,
+    OF_WORKERS,
+    WORDS,
+    Entry,
+)
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
 from hrc_env.env_words import EnvironmentArguments
@@ -33,6 +46,7 @@ from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.pipeline.levels import EMULATED
 from hrc_env.reset_options import ResetOptions
 from hrc_env.rewards import RewardTerm
+from hrc_env.safety import incidents
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import REGIONS, effective_mass, permitted_contact_speed
 from hrc_env.scene.rig_distribution import RigDistribution
@@ -141,10 +155,10 @@ place for 3 times `tracker.lost_relaxation_s`.
 All slots also become unknown if several cameras repeatedly detect people whom no pose explains, as
 with a wrong calibration; `info["perception/miscalibrated"]` counts such cameras.
 
-`worker_blind` is the time since cameras last saw the worker, or saw that the slot is empty [s].
-With four cameras an empty room is known to be empty one step after the reset at `keypoints`, and a
-second after it at `pixels`, where cameras search every fifth step. At level `truth` no slot is
-unknown; at level `none` every slot is.
+`worker_unobserved_time` is the time since cameras last saw the worker, or saw that the slot is
+empty [s]. With four cameras an empty room is known to be empty one step after the reset at
+`keypoints`, and a second after it at `pixels`, where cameras search every fifth step. At level
+`truth` no slot is unknown; at level `none` every slot is.
 
 The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that
 a lost track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at
@@ -440,6 +454,17 @@ def infos() -> str:
         for name, each in KINDS.items()
     ]  # fmt: skip
     rows.append(("`shield/...`", "-", "further values that a custom shield returns"))
+    absent, kinds = f'"{ABSENT}"', ", ".join(f'"{name}"' for name in incidents.KINDS)
+    words = {
+        ACTIVITY: f"activity of each worker; {absent} for one that is not in the episode",
+        BODY: f"body of each worker; {absent} for one that is not in the episode",
+        CONTACT_KIND: f"for each contact that begins in this step, the robot's motion: {kinds}",
+        CONTACT_REGION: "for each of these contacts, the body region, such as "
+        f'"{incidents.REGION_NAMES[0]}"',
+        MISCALIBRATED: "cameras that contradict the others",
+    }
+    if tuple(words) != (*WORDS, MISCALIBRATED):
+        raise ValueError("hrc_env/infos.py: the keys of WORDS have no description here.")
     return "\n".join(
         (
             "# Keys of info\n",
@@ -450,9 +475,13 @@ def infos() -> str:
             "not use them.\n\nThe keys are the same in every step and at the reset, and all values "
             "are numbers. Where a value was not measured in a step, it has the substitute given "
             "below, and a key that ends in `_measured` is 0. `env.unwrapped.words(info)` "
-            "translates indices into words. A vector environment returns an array and a mask "
-            "`_name` for each key ([many environments](../many_environments.md)).\n",
+            "translates indices into [words](#words). A vector environment returns an array and a "
+            "mask `_name` for each key ([many environments](../many_environments.md)).\n",
             _table(("key", "unit", "meaning"), rows) + "\n",
+            "## Words\n",
+            "`env.unwrapped.words(info)` returns a dictionary of tuples of names. In a vector "
+            "environment, each value is an array of such tuples.\n",
+            _table(("key", "names"), [(f"`{name}`", text) for name, text in words.items()]) + "\n",
         )
     )
 

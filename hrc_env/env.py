@@ -237,6 +237,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
         Args:
             info: info that `reset` or `step` returned.
+
+        Returns:
+            Tuples of names, by the keys in docs/reference/infos.md, such as "worker/activity".
         """
         return name_indices(info, words_of(self.body_names))
 

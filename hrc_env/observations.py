@@ -25,6 +25,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState
+from hrc_env.core.renamed_keys import RenamedKeys
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Tensor
 from hrc_env.geometry.rotations import matrix
@@ -35,6 +36,12 @@ FLAT = "observation"
 """Key of the flat observation in an observation dictionary with goals or images."""
 IMAGE = "image_"
 """Prefix of the keys of images in an observation dictionary, followed by the camera's name."""
+RENAMED = {
+    "way_direction": "path_direction",
+    "way_left": "remaining_path",
+    "worker_blind": "worker_unobserved_time",
+}
+"""Current names of renamed observation terms, by their former names."""
 FAR_SEPARATION_M = 1.0
 """Largest separation in the observation, also used for workers without a track [m]."""
 
@@ -344,7 +351,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         function=lambda belief: belief.estimate.unknown.astype(float),
     ),
     ObservationTerm(
-        name="worker_blind",
+        name="worker_unobserved_time",
         size=lambda sizes: sizes.workers,
         unit="s",
         frame="-",
@@ -439,6 +446,13 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
 """Observation terms that are appended if `HRCConfig.observe_shield` is true."""
 
 
+class TermDict(RenamedKeys):
+    """Values by observation term, with errors that name the right key for a former one."""
+
+    WHAT = "observation term"
+    RENAMED = RENAMED
+
+
 @dataclass(frozen=True, slots=True)
 class ObservationLayout:
     """Assignment of the entries of the flat observation to terms."""
@@ -460,7 +474,9 @@ def make_layout(terms: tuple[ObservationTerm, ...], sizes: Sizes) -> Observation
     """Compute the layout of the flat observation for given sizes."""
     counts = [term.size if isinstance(term.size, int) else term.size(sizes) for term in terms]
     ends = np.cumsum(counts).tolist()
-    slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, counts, ends, strict=True)}
+    slices = TermDict(
+        {t.name: slice(end - n, end) for t, n, end in zip(terms, counts, ends, strict=True)}
+    )
     bound = np.repeat([term.bound / term.scale for term in terms], counts).astype(np.float32)
     scale = np.repeat([term.scale for term in terms], counts)
     present = tuple(np.flatnonzero(counts).tolist())
@@ -535,9 +551,7 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
     return numbers
 
 
-def split(
-    observation: Tensor | Mapping[str, Tensor], layout: ObservationLayout
-) -> dict[str, Floats]:
+def split(observation: Tensor | Mapping[str, Tensor], layout: ObservationLayout) -> TermDict:
     """Split a flat observation (..., n) into named terms in their units.
 
     Goals and images of an observation dictionary are added without scaling.
@@ -548,6 +562,6 @@ def split(
             for name, part in observation.items()
             if name != FLAT
         }
-        return {**split(observation[FLAT], layout), **beside}
+        return TermDict({**split(observation[FLAT], layout), **beside})
     physical = observation * layout.scale
-    return {name: physical[..., part] for name, part in layout.slices.items()}
+    return TermDict({name: physical[..., part] for name, part in layout.slices.items()})

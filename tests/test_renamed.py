@@ -3,11 +3,16 @@
 import pickle
 import re
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import hrc_env
+from hrc_env import observations
+from hrc_env.__main__ import main
+from hrc_env.agents import policies
+from hrc_env.agents.env_info import env_info
 from hrc_env.control import ControlConfig
 from hrc_env.core import infos
 from hrc_env.core.errors import ConfigError
@@ -67,6 +72,22 @@ def test_former_names_are_answered_wherever_settings_are_given():
         hrc_env.HRCEnv(cameras=read_cameras(['{"place_m": 0.1}']))
 
 
+@pytest.mark.parametrize(
+    ("command", "former", "present"),
+    [("lab", "--folded", "--folded-network"), ("price", "--eyes", "--setups")],
+)
+def test_a_former_option_of_a_command_is_an_error_that_gives_the_present_one(
+    command, former, present, capsys
+):
+    assert main(["experiment", command, former, "heavy"]) == 2
+    assert f"The option {former} is called {present} now." in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["experiment", command, "--help"])
+    shown = capsys.readouterr().out
+    assert f"{present} " in shown
+    assert f"{former} " not in shown
+
+
 def test_a_former_component_of_the_cost_is_an_error_that_gives_the_present_one():
     with pytest.raises(ConfigError, match="'too_near' is called 'separation_violated' now"):
         hrc_env.HRCEnv(config={"cost": {"components": ["too_near"]}})
@@ -92,6 +113,32 @@ def test_a_former_key_of_infos_is_an_error_that_gives_the_present_one(former, pr
     assert info.get("other", 2.0) == 2.0
     with pytest.raises(ConfigError, match=re.escape(expected)):
         infos.match_keys([former], [present])
+
+
+@pytest.mark.parametrize(("former", "present"), sorted(observations.RENAMED.items()))
+def test_a_former_observation_term_is_an_error_that_gives_the_present_one(former, present):
+    with closing(hrc_env.HRCEnv("HRCDelivery-v0", perception="truth")) as env:
+        terms = env.split_observation(env.reset(seed=0)[0])
+        slices = env.simulation.layout.slices
+    for named in (terms, slices):
+        assert present in named
+        with pytest.raises(KeyError, match=f"observation term '{former}' is called '{present}'"):
+            named[former]
+        with pytest.raises(KeyError, match=f"observation term '{former}' is called '{present}'"):
+            named.get(former)
+
+
+def test_a_policy_with_a_former_observation_term_is_refused_with_the_present_one():
+    with closing(hrc_env.HRCEnv(perception="truth")) as env:
+        here = env_info(env)
+    card = policies.read(policies.FOLDER / "HRCReach-v0" / "fast.safetensors")[0]
+    former = [
+        replace(term, name="worker_blind") if term.name == "worker_unobserved_time" else term
+        for term in card.observation
+    ]
+    assert policies.list_differences(replace(card, observation=tuple(former)), here) == [
+        "The observation term 'worker_blind' is called 'worker_unobserved_time' now"
+    ]
 
 
 def test_infos_of_resets_and_steps_answer_former_keys():

@@ -90,7 +90,8 @@ def test_the_observation_says_who_is_unknown_and_for_how_long():
     env, *_ = played(45, faults=BLIND)
     terms = env.split_observation(env.step(np.zeros(6, np.float32))[0])
     assert terms["worker_unknown"] == [1.0]
-    assert terms["worker_blind"] == pytest.approx(env.simulation.estimate.unobserved_s[0], abs=1e-6)
+    unobserved_s = env.simulation.estimate.unobserved_s[0]
+    assert terms["worker_unobserved_time"] == pytest.approx(unobserved_s, abs=1e-6)
 
 
 def test_several_environments_know_what_single_ones_do_and_states_keep_it():

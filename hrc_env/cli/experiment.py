@@ -1,5 +1,6 @@
 """Run an experiment of the paper, a study of perception and safety, or the ablations."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -60,10 +61,11 @@ class LabExperiment(AnyExperiment):
     """Run the paper's laboratory experiment: all joints in six motions, one camera or four."""
 
     name = "lab"
+    RENAMED: ClassVar[Mapping[str, str]] = {"folded": "folded-network"}
     out: Path = Path("out/lab")
     seeds: int | None = None
     """Number of films per motion (default: 7, quick: 2)."""
-    folded: str = "full"
+    folded_network: str = "full"
     """Landmark network for folded postures: full, or heavy, which `python -m hrc_env setup
     --networks heavy` fetches once."""
 
@@ -102,13 +104,14 @@ class PriceExperiment(AnyExperiment):
     """
 
     name = "price"
+    RENAMED: ClassVar[Mapping[str, str]] = {"eyes": "setups"}
     out: Path = Path("out/price")
     task: str = DEFAULT
     """Id of the environment."""
     seeds: int | None = None
     """Number of episodes per step of the search for a margin (default: 300). The resulting margin
     is confirmed by 10 new episodes for every 3 of these (default: 1000; quick: 600)."""
-    eyes: tuple[str, ...] = ()
+    setups: tuple[str, ...] = ()
     """Names of the perception setups to compare, for example truth particle one_camera (default:
     all; quick: 12)."""
     robots: tuple[str, ...] = ()

@@ -25,9 +25,12 @@ def normalize_words(command: type[Any], words: Sequence[str], program: str) -> l
         words: the arguments of the command line.
         program: the command as it is called, for error messages.
 
+    A command may list renamed options in `RENAMED: ClassVar[Mapping[str, str]]`, new names by old
+    names.
+
     Raises:
-        ConfigError: an option does not exist (the message suggests the nearest one), or a switch
-            has a value other than True and False.
+        ConfigError: an option does not exist (the message suggests the nearest one, or gives the
+            current name of a renamed one), or a switch has a value other than True and False.
     """
     given, result = [*words], list[str]()
     while given and given[0] == "--":
@@ -47,6 +50,8 @@ def normalize_words(command: type[Any], words: Sequence[str], program: str) -> l
             continue
         option, equals, text = word.removeprefix("--").partition("=")
         name, is_off = option.replace("_", "-"), False
+        if name in (renamed := getattr(command, "RENAMED", {})):
+            raise ConfigError(f"The option --{name} is called --{renamed[name]} now.")
         if name.startswith("no-") and name[3:] in switches | optional:
             name, is_off = name[3:], True
         if name not in {*options, *ALWAYS}:

@@ -6,7 +6,6 @@ finite, another key states whether the number was measured. Names are encoded as
 `name_indices` decodes.
 """
 
-import difflib
 import fnmatch
 import re
 from collections.abc import Mapping, Sequence
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
+from hrc_env.core.renamed_keys import RenamedKeys, describe_renaming
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
@@ -55,8 +55,10 @@ RENAMED = {
     "safety/contact_closing_m_s": "safety/contact_closing_speed_m_s",
     "safety/too_near": "safety/separation_violated",
     "shield/least_m": "shield/clearance_m",
-    "task/fixed_hits": "task/obstacle_hits",
+    "task/fixed_hits": "task/obstacle_collisions",
     "task/largest_n": "task/max_hand_force_n",
+    "task/obstacle_hits": "task/obstacle_collisions",
+    "task/people_hits": "task/worker_collisions",
     "task/screws_left": "task/screws_remaining",
     "task/studs_left": "task/studs_remaining",
     "task/way_left_m": "task/remaining_path_m",
@@ -67,30 +69,11 @@ RENAMED = {
 """Current keys of renamed infos, by their former keys."""
 
 
-class InfoDict(dict[str, Any]):
+class InfoDict(RenamedKeys):
     """Info of a reset or step, with errors that name the right key for a former or misspelt one."""
 
-    def __missing__(self, key: str) -> Any:
-        """Raise a `KeyError` for a missing key."""
-        if key in RENAMED:
-            raise KeyError(_describe_renaming(key))
-        near = difflib.get_close_matches(str(key), self, 1)
-        raise KeyError(f"{key}; did you mean {near[0]!r}?" if near else key)
-
-    def get(self, key: str, default: Any = None) -> Any:
-        """Return the value of a key, or `default` for one that is missing.
-
-        Raises:
-            KeyError: the key is a former one.
-        """
-        if key in RENAMED and key not in self:
-            raise KeyError(_describe_renaming(key))
-        return super().get(key, default)
-
-
-def _describe_renaming(key: str) -> str:
-    """Return the error message for a former key of an info."""
-    return f"The info key {key!r} is called {RENAMED[key]!r} now."
+    WHAT = "info key"
+    RENAMED = RENAMED
 
 
 class Entry(NamedTuple):
@@ -290,8 +273,8 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1", "whether the base reached its zone without a collision on the way"
     ),
     "task/not_delivered": Entry("0 or 1", "the negation of `task/delivered`"),
-    "task/obstacle_hits": Entry("-", "number of collisions of the base with fixed objects"),
-    "task/people_hits": Entry("-", "number of collisions of the base with workers"),
+    "task/obstacle_collisions": Entry("-", "number of collisions of the base with fixed objects"),
+    "task/worker_collisions": Entry("-", "number of collisions of the base with workers"),
     "task/remaining_path_m": Entry("m", "length of the remaining path to the zone"),
     "is_success": Entry("0 or 1", "success, as defined on the page of the task"),
     MISCALIBRATED: Entry(
@@ -391,7 +374,7 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
         )
     for each in given:
         if each in RENAMED:
-            raise ConfigError(_describe_renaming(each))
+            raise ConfigError(describe_renaming(InfoDict.WHAT, each, RENAMED))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
             raise make_unknown_name_error("info", each, [*folders, *names])

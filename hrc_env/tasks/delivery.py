@@ -216,7 +216,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             function=lambda belief: belief.task.goal_world - belief.robot.q[:, :2],
         ),
         ObservationTerm(
-            name="way_left",
+            name="remaining_path",
             size=1,
             unit="m",
             frame="-",
@@ -226,7 +226,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
             function=lambda belief: belief.task.way_m,
         ),
         ObservationTerm(
-            name="way_direction",
+            name="path_direction",
             size=2,
             unit="-",
             frame="world",
@@ -377,8 +377,8 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return {
             "task/delivered": delivered,
             "task/not_delivered": 1.0 - delivered,
-            "task/obstacle_hits": state["hits"][:, 0].astype(float),
-            "task/people_hits": state["hits"][:, 1].astype(float),
+            "task/obstacle_collisions": state["hits"][:, 0].astype(float),
+            "task/worker_collisions": state["hits"][:, 1].astype(float),
             "task/remaining_path_m": state["way_m"].copy(),
             "is_success": delivered,
         }

@@ -25,6 +25,7 @@ from rich.console import Console
 
 import hrc_env
 from assets.recordings.written import ORDERS, Y_UP, cmu_name, write_acclaim, write_bvh
+from hrc_env import observations
 from hrc_env.agents import policies as trained
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import find_control, make_agent
@@ -217,7 +218,12 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {present: former for former, present in infos.RENAMED.items()}
+TERMS: dict[str, str] = {present: former for former, present in observations.RENAMED.items()}
+"""Today's names of observation terms that the probes know by another."""
+RENAMED: dict[str, str] = {
+    **{present: former for former, present in reversed(infos.RENAMED.items())},
+    **{f"observation/{present}": f"observation/{former}" for present, former in TERMS.items()},
+}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -285,7 +291,7 @@ class Env:
         layout = self._simulation.layout
         low, high = layout.low, layout.high
         terms = {
-            f"{name}": np.concatenate([low[part], high[part], layout.scale[part]])
+            TERMS.get(name, name): np.concatenate([low[part], high[part], layout.scale[part]])
             for name, part in self._slices.items()
         }
         terms["action"] = np.concatenate([np.ravel(self._env.action_space.low),

@@ -1,4 +1,4 @@
-"""What sight costs at one rate of contacts: search, intervals, eyes, what is written."""
+"""What sight costs at one rate of contacts: search, intervals, setups, what is written."""
 
 import json
 import signal
@@ -23,7 +23,6 @@ from hrc_env.experiments.price.experiment import (
     check_walks,
     make_experiment,
 )
-from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, find_eyes, list_eyes
 from hrc_env.experiments.price.metrics import (
     CONTRASTS,
     Played,
@@ -33,6 +32,7 @@ from hrc_env.experiments.price.metrics import (
 )
 from hrc_env.experiments.price.report import choose_bars
 from hrc_env.experiments.price.search import MarginSearch, draw_seeds, run_together, search
+from hrc_env.experiments.price.setups import ELSEWHERE, QUICK, find_setups, list_setups
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
@@ -41,7 +41,7 @@ from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 
 TINY = Price(
-    eyes=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=1, n_pixels=0, n_steps=50
+    setups=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=1, n_pixels=0, n_steps=50
 )
 
 
@@ -164,8 +164,8 @@ def test_nothing_counts_after_the_end_of_an_episode():
     assert found["minutes"] == pytest.approx(10 * 0.04 / 60)
 
 
-def test_eyes_are_what_their_names_say():
-    known = list_eyes()
+def test_setups_are_what_their_names_say():
+    known = list_setups()
     assert set(QUICK) <= known.keys()
     assert len(QUICK) == 12
     assert set(ELSEWHERE) <= set(QUICK)
@@ -176,7 +176,7 @@ def test_eyes_are_what_their_names_say():
     assert turned.faults[0].max_amount == pytest.approx(np.deg2rad(1))
     assert len(known["one_frozen"].turns("lab")) == 4
     assert known["half_covariance"].covariance == 0.5
-    assert known["paper_restarts"].setup == PerceptionSetup(estimator="paper_restarts")
+    assert known["paper_restarts"].perception == PerceptionSetup(estimator="paper_restarts")
     sites = known["one_camera"].turns("site")
     assert sites[0].cameras != known["one_camera"].turns("lab")[0].cameras
 
@@ -186,10 +186,10 @@ def test_eyes_are_what_their_names_say():
     [
         ({"n_seeds": 0}, "--seeds must be at least 1"),
         (
-            {"eyes": ("one_camara",)},
+            {"setups": ("one_camara",)},
             "Unknown perception setup 'one_camara'. Did you mean 'one_camera'",
         ),
-        ({"eyes": ()}, "No perception setup to compare"),
+        ({"setups": ()}, "No perception setup to compare"),
         ({"bracket_m": (0.1, 0.1)}, "bracket_m must be"),
         ({"level": 0.0}, "level must be positive"),
         ({"task": "HRCReach-v1"}, "Unknown task 'HRCReach-v1'"),
@@ -214,7 +214,7 @@ def test_a_folder_of_other_results_is_refused(tmp_path):
 
 def test_what_the_command_asks_for():
     full, quick = make_experiment(), make_experiment(quick=True)
-    assert quick.eyes == QUICK
+    assert quick.setups == QUICK
     assert (quick.others, quick.n_pixels) == ((), 0)
     assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 600, 4)
     assert full.n_fresh == 1000
@@ -222,20 +222,20 @@ def test_what_the_command_asks_for():
     assert full.n_pixels == 40
     assert make_experiment(seeds=3).n_fresh == 10
     elsewhere = make_experiment(task="HRCHandover-v0")
-    assert elsewhere.eyes == ELSEWHERE
+    assert elsewhere.setups == ELSEWHERE
     assert len(elsewhere.list_seeds("HRCHandover-v0", 300)) == 100  # as much time
-    assert make_experiment(eyes=("truth", "truth")).eyes == ("truth",)
+    assert make_experiment(setups=("truth", "truth")).setups == ("truth",)
 
 
 def test_a_wider_shield_intervenes_more_and_covariances_are_told():
-    stage = EpisodeRunner(replace(list_eyes()["truth"]), "HRCReach-v0", 60)
+    stage = EpisodeRunner(replace(list_setups()["truth"]), "HRCReach-v0", 60)
     seeds = [3_000_000 + k for k in range(8)]
     narrow, wide, again = (stage.play(seeds, m, lambda share: None) for m in (-2.0, 1.0, -2.0))
     stage.close()
     assert narrow == again
     assert sum(wide["achieved"]) < sum(narrow["achieved"])
     assert narrow["walk"] == wide["walk"]
-    alone = EpisodeRunner(list_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
+    alone = EpisodeRunner(list_setups()["truth"], "HRCReach-v0", 60, is_shielded=False)
     assert alone.play(seeds, 0.0, lambda share: None) == narrow
     alone.close()
 
@@ -259,7 +259,7 @@ def test_only_the_shield_is_told_other_covariances(monkeypatch):
 
 def test_every_row_says_everything(end_to_end):
     out, metrics = end_to_end
-    for name in TINY.eyes:
+    for name in TINY.setups:
         for what in ("margin_m", "goals_per_min", "share", "of_truth", "confirmed.margin_m",
                      "confirmed.towards", "confirmed.standing", "confirmed.away",
                      "confirmed.goals_per_min", "confirmed.cost"):  # fmt: skip
@@ -307,7 +307,7 @@ def test_parts_do_not_depend_on_the_engine(end_to_end, tmp_path):
 
 
 def row(rng, goals: float) -> Row:
-    """A pair of eyes whose search is `tried`, with so many goals more."""
+    """A setup whose search is `tried`, with so many goals more."""
     found = tried(rng, 50, 60)
     searches = {
         m: {"towards": e, "achieved": a + goals, "minutes": minutes}
@@ -321,7 +321,7 @@ def row(rng, goals: float) -> Row:
     return Row(searches, found.fresh_margin_m, {**fresh, **nothing})
 
 
-def test_eyes_are_compared_draw_by_draw():
+def test_setups_are_compared_draw_by_draw():
     more = {"truth": 1.0, "particle": 0.6, "one_camera": 0.0}
     rows = {name: row(np.random.default_rng(0), goals) for name, goals in more.items()}
     alone = {"HRCReach-v0": rows["truth"].fresh}
@@ -344,8 +344,8 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
 
     monkeypatch.setattr(EpisodeRunner, "play", play)
     cache, alone = PartCache(tmp_path, "", 1, silent), {"walk": [0] * TINY.n_fresh}
-    (eyes,) = find_eyes(["truth"])
-    margin_search = experiment.search_margin(TINY, "HRCReach-v0", eyes, alone)
+    (setup,) = find_setups(["truth"])
+    margin_search = experiment.search_margin(TINY, "HRCReach-v0", setup, alone)
     (row,) = run_together([margin_search], cache.make_parts)
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
     assert row.ends_at(row.evaluate(30.0)[0, 0])
@@ -360,13 +360,13 @@ def test_workers_who_walk_otherwise_are_noticed_where_nobody_waits():
         check_walks("HRCReach-v0", other, one)
 
 
-def test_the_best_eyes_stand_above():
+def test_the_best_setups_stand_above():
     metrics = {
         f"HRCReach-v0.{name}.share": Metric(k / 10, k / 10, k / 10, "share", 1)
         for k, name in enumerate(("truth", "one_camera", "particle"))
     }
-    eyes = find_eyes(["truth", "particle", "one_camera"])
-    shown = choose_bars(metrics, "HRCReach-v0", eyes)
+    setups = find_setups(["truth", "particle", "one_camera"])
+    shown = choose_bars(metrics, "HRCReach-v0", setups)
     assert [each.name for each in shown] == ["truth", "one_camera", "particle"]
 
 

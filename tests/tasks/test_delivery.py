@@ -130,7 +130,7 @@ def test_the_material_is_delivered_when_the_base_stands_in_its_zone():
     assert info["task/not_delivered"].tolist() == [0.0, 1.0]
 
 
-@pytest.mark.parametrize("what", ["obstacle", "people"])
+@pytest.mark.parametrize("what", ["obstacle", "worker"])
 def test_who_hits_something_has_not_delivered(what):
     state = begun(at(0))
     x, y = SITE.grounds.robot_xy_m
@@ -140,7 +140,7 @@ def test_who_hits_something_has_not_delivered(what):
     assert not step["hit"][0]
     moved(state, world(at(int(state["zone"][0]))))
     info = TASK.info(state)
-    assert info[f"task/{what}_hits"][0] == 1
+    assert info[f"task/{what}_collisions"][0] == 1
     assert info["is_success"][0] == 0
 
 
@@ -214,7 +214,7 @@ def test_wild_driving_breaks_nothing():
         assert np.isfinite(reward).all()
     q = envs.unwrapped.shards.first.physics.q
     assert np.abs(q[:, :2]).max() < BASE.range_rad[0, 1]
-    hits = TASK.info(envs.unwrapped.shards.first.task_state)["task/obstacle_hits"]
+    hits = TASK.info(envs.unwrapped.shards.first.task_state)["task/obstacle_collisions"]
     assert hits.max() > 0
     envs.close()
 

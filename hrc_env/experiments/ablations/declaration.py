@@ -52,7 +52,7 @@ _SHOWN = {
     "calibration": "all_rotation_1deg site_all_rotation_1deg",
     "occlusion": "lab_lost_1 lab_lost_2 lab_lost_3 dropped_60pct dropped_90pct",
     "workers": "lab_2 lab_3",
-    "filter": "4cam_bones_of_any_length 4cam_no_outliers 4cam_noise_as_told "
+    "filter": "4cam_bones_of_any_length 4cam_no_outliers 4cam_reported_noise "
     "1cam_bones_of_any_length 1cam_no_floor 1cam_velocity_forgotten 1cam_mode_for_mean "
     "1cam_no_turned_body",
 }

@@ -59,7 +59,7 @@ FAR = Table(
         *(
             Column(f"{what}.{c}.{{}}", f"{words}, {CAMERA_LABELS[c]} [%]", 0, 100)
             for what, words in (
-                ("missed_far", "missed"), ("recovered_far", "of these known with four"),
+                ("missed_far", "missed"), ("recovered_far", "of these located by four"),
             )
             for c in SINGLE
         ),

@@ -55,14 +55,14 @@ class Lab:
     """Number of films per motion."""
     max_frames: int = 250
     """Maximum number of frames in a film."""
-    folded: str = "full"
+    folded_network: str = "full"
     """Landmark network for folded postures; "heavy" must first be fetched with `python -m hrc_env
     setup --networks heavy`."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds")
-        DetectorConfig(folded_network=self.folded)
+        DetectorConfig(folded_network=self.folded_network)
 
     @property
     def seeds(self) -> list[int]:
@@ -111,9 +111,11 @@ QUICK = Lab(n_seeds=2, max_frames=100)
 """The quick form of the study, with fewer and shorter films."""
 
 
-def make_experiment(quick: bool = False, seeds: int | None = None, folded: str = "full") -> Lab:
+def make_experiment(
+    quick: bool = False, seeds: int | None = None, folded_network: str = "full"
+) -> Lab:
     """Return the experiment for the options of the command line."""
-    return override(QUICK if quick else Lab(), n_seeds=seeds, folded=folded)
+    return override(QUICK if quick else Lab(), n_seeds=seeds, folded_network=folded_network)
 
 
 class Laboratory(NamedTuple):
@@ -123,12 +125,12 @@ class Laboratory(NamedTuple):
     config: HRCConfig
 
 
-def make_laboratory(seed: int, folded: str = "full") -> Laboratory:
+def make_laboratory(seed: int, folded_network: str = "full") -> Laboratory:
     """Return the scene with the paper's four cameras; the seed selects one of the body models."""
     names = worker_names()
     config = HRCConfig(
         worker=names[seed % len(names)],
-        detector=DetectorConfig(folded_network=folded),
+        detector=DetectorConfig(folded_network=folded_network),
         scene=SceneConfig(cameras=RIGS[RIG]),
     )
     return Laboratory(build(config.scene, "lab", 1, config.worker), config)
@@ -136,7 +138,7 @@ def make_laboratory(seed: int, folded: str = "full") -> Laboratory:
 
 def record_film(config: Lab, motion: str, seed: int, tick: PartProgress) -> Recording:
     """Record one film of one motion."""
-    scene, settings = make_laboratory(seed, config.folded)
+    scene, settings = make_laboratory(seed, config.folded_network)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 

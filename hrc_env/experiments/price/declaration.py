@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH, Eyes, list_eyes
 from hrc_env.experiments.price.metrics import PER
+from hrc_env.experiments.price.setups import ELSEWHERE, FOUR, ONE, TRUTH, PriceSetup, list_setups
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Table
 
@@ -84,7 +84,7 @@ def count_per_hour(level: float) -> float:
 
 def make_price_table(
     task: str,
-    eyes: Sequence[Eyes],
+    setups: Sequence[PriceSetup],
     robot: str,
     n_seeds: int,
     level: float,
@@ -94,7 +94,7 @@ def make_price_table(
 
     Args:
         task: id of the environment.
-        eyes: setups in the order of the rows.
+        setups: setups in the order of the rows.
         robot: description of the robot, such as "the scripted robot".
         n_seeds: number of episodes per search step.
         level: contacts in 1,000 episodes of 10 s at which setups are compared.
@@ -103,7 +103,7 @@ def make_price_table(
     return Table(
         "price",
         f"Cost of perception at {level:g} contacts in 1,000 episodes",
-        {(task, each.name): (each.words,) for each in eyes},
+        {(task, each.name): (each.words,) for each in setups},
         (*COLUMNS, *more),
         ("perception",),
         f"Goals that {robot} reaches beside workers of one body who ignore it, with emulated "
@@ -112,21 +112,21 @@ def make_price_table(
         f"that is {count_per_hour(level):.1f} times per hour; other contacts are not equalized. "
         "The margin is added to all protective distances; 0 is the default shield, and negative "
         f"margins let the robot come closer. It is found on {n_seeds} episodes and corrected by "
-        f"{{n[{task}.{eyes[0].name}.margin_m]}} others, which are played with the tested margin. "
+        f"{{n[{task}.{setups[0].name}.margin_m]}} others, which are played with the tested margin. "
         "True joints: the shield knows the joints and has its own model of the body around them.",
     )
 
 
 def make_small_price_table(task: str) -> Table:
     """Return the table of an additional task, in which few setups are compared."""
-    rows = {(task, name): (list_eyes()[name].words,) for name in ELSEWHERE}
+    rows = {(task, name): (list_setups()[name].words,) for name in ELSEWHERE}
     return Table("price_in", task, rows, (*LEFT, TOWARDS), ("perception",))
 
 
 def make_tasks_table(tasks: Sequence[str]) -> Table:
     """Return the table of all tasks, with one row per task."""
     words = {TRUTH: "true joints", FOUR: "four cameras", ONE: "one camera"}
-    shares = [Column(f"{{}}.{eyes}.share", f"{words[eyes]} [%]", 0, 100) for eyes in ELSEWHERE]
+    shares = [Column(f"{{}}.{name}.share", f"{words[name]} [%]", 0, 100) for name in ELSEWHERE]
     return Table(
         "price_elsewhere",
         "Cost of perception in all tasks",

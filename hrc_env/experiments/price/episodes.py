@@ -20,7 +20,7 @@ from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.agents import describe_agent
 from hrc_env.experiments.cache import PartProgress
-from hrc_env.experiments.price.eyes import Eyes
+from hrc_env.experiments.price.setups import PriceSetup
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.stage import EndlessEpisodes, Rows, Stage
 from hrc_env.motion import generator
@@ -85,17 +85,17 @@ class EpisodeRunner:
 
     def __init__(
         self,
-        eyes: Eyes,
+        setup: PriceSetup,
         task: str,
         n_steps: int,
         is_shielded: bool = True,
         driver: Driver = Driver(),
     ) -> None:
-        self.eyes, self.task, self.n_steps, self.driver = eyes, task, n_steps, driver
-        self.is_shielded, self._shield = is_shielded, Widened(eyes.covariance)
+        self.setup, self.task, self.n_steps, self.driver = setup, task, n_steps, driver
+        self.is_shielded, self._shield = is_shielded, Widened(setup.covariance)
         shield = self._shield if is_shielded else None
         arguments = {"task": task, "shield": shield, **driver.env_arguments}
-        self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), arguments)
+        self._stage = Stage(setup.perception, setup.turns(find_task(task).scene), arguments)
 
     def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
         """Play episodes with `margin_m` added to the shield's distances; return their sums."""
@@ -109,7 +109,7 @@ class EpisodeRunner:
 
 
 def play_episodes(
-    eyes: Eyes,
+    setup: PriceSetup,
     task: str,
     n_steps: int,
     is_shielded: bool,
@@ -121,7 +121,7 @@ def play_episodes(
     """Play episodes as `EpisodeRunner.play` does, in environments that are made for this call.
 
     Args:
-        eyes: the perception setup.
+        setup: the perception setup.
         task: id of the environment.
         n_steps: length of an episode [control steps].
         is_shielded: whether there is a shield.
@@ -130,7 +130,7 @@ def play_episodes(
         margin_m: margin added to the shield's distances [m].
         tick: callback that receives the increase of the completed fraction.
     """
-    with closing(EpisodeRunner(eyes, task, n_steps, is_shielded, driver)) as runner:
+    with closing(EpisodeRunner(setup, task, n_steps, is_shielded, driver)) as runner:
         return runner.play(seeds, margin_m, tick)
 
 

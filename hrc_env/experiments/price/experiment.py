@@ -17,18 +17,18 @@ from hrc_env.experiments.cache import Part, PartCache
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.price import declaration
 from hrc_env.experiments.price.episodes import SCRIPTED, Driver, play_episodes
-from hrc_env.experiments.price.eyes import (
+from hrc_env.experiments.price.metrics import PER, Played, Row, compute_metrics, suppose_margin_m
+from hrc_env.experiments.price.report import make_report
+from hrc_env.experiments.price.search import run_together, search
+from hrc_env.experiments.price.setups import (
     ELSEWHERE,
     FOUR,
     QUICK,
     TRUTH,
-    Eyes,
-    find_eyes,
-    list_default_eyes,
+    PriceSetup,
+    find_setups,
+    list_default_setups,
 )
-from hrc_env.experiments.price.metrics import PER, Played, Row, compute_metrics, suppose_margin_m
-from hrc_env.experiments.price.report import make_report
-from hrc_env.experiments.price.search import run_together, search
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
 from hrc_env.experiments.rigs import DT_S
@@ -53,7 +53,7 @@ class Case(NamedTuple):
     """A task and the perception setup with which it is played."""
 
     task: str
-    eyes: Eyes
+    setup: PriceSetup
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Price:
     """Id of the environment."""
     others: tuple[str, ...] = ()
     """Other tasks, which are played with the setups `ELSEWHERE`."""
-    eyes: tuple[str, ...] = field(default_factory=list_default_eyes)
+    setups: tuple[str, ...] = field(default_factory=list_default_setups)
     """Names of the perception setups."""
     n_seeds: int = 300
     """Number of episodes per search step."""
@@ -92,10 +92,10 @@ class Price:
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""
         check_at_least_one(self, "n_seeds", "n_fresh", "n_search")
-        find_eyes(self.eyes)
-        if not self.eyes:
+        find_setups(self.setups)
+        if not self.setups:
             raise ConfigError(
-                f"No perception setup to compare; valid are {', '.join(list_default_eyes())}."
+                f"No perception setup to compare; valid are {', '.join(list_default_setups())}."
             )
         low, high = self.bracket_m
         if not (low < high and self.level > 0):
@@ -115,8 +115,8 @@ class Price:
     def list_cases(self) -> Iterator[Case]:
         """Yield every task with every perception setup."""
         for name in self.tasks:
-            for eyes in find_eyes(self.eyes if name == self.task else ELSEWHERE):
-                yield Case(name, eyes)
+            for setup in find_setups(self.setups if name == self.task else ELSEWHERE):
+                yield Case(name, setup)
 
     def count_steps(self, task: str) -> int:
         """Return the number of control steps of an episode of a task."""
@@ -143,7 +143,7 @@ class Price:
         The parts are search steps, and episodes without a shield or with rendered images.
         """
         n_cases = sum(1 for _ in self.list_cases())
-        n_levels = 2 if self.n_pixels and FOUR in self.eyes else 0
+        n_levels = 2 if self.n_pixels and FOUR in self.setups else 0
         n_each = self.n_search + 4 + len(BEYOND_M)
         return n_cases * n_each + 1 + len(self.others) + n_levels
 
@@ -171,12 +171,12 @@ class Price:
         alone = cache.make_parts([_play_unshielded(self, task) for task in self.tasks])
         unshielded = dict(zip(self.tasks, alone, strict=True))
         searches = [
-            search_margin(self, task, eyes, unshielded[task]) for task, eyes in self.list_cases()
+            search_margin(self, task, setup, unshielded[task]) for task, setup in self.list_cases()
         ]
         table: dict[str, dict[str, Row]] = {}
         rows = run_together(searches, cache.make_parts)
-        for (task, eyes), row in zip(self.list_cases(), rows, strict=True):
-            table.setdefault(task, {})[eyes.name] = row
+        for (task, setup), row in zip(self.list_cases(), rows, strict=True):
+            table.setdefault(task, {})[setup.name] = row
         return Played(table, unshielded, _compare_levels(self, cache, table))
 
     def metrics(self, played: Played) -> dict[str, Metric]:
@@ -195,7 +195,7 @@ class Price:
             more: columns in addition to those of the documentation.
         """
         return declaration.make_price_table(
-            self.task, find_eyes(self.eyes), self.driver.words, self.n_seeds, self.level, more
+            self.task, find_setups(self.setups), self.driver.words, self.n_seeds, self.level, more
         )
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
@@ -217,7 +217,7 @@ def make_experiment(
     quick: bool = False,
     seeds: int | None = None,
     task: str = DEFAULT,
-    eyes: Sequence[str] = (),
+    setups: Sequence[str] = (),
     robots: Sequence[str] = (),
     control: str | None = None,
     trust: bool = False,
@@ -236,19 +236,21 @@ def make_experiment(
     driver = Driver(*robots or (SCRIPTED,), control=control, trust=trust)
     others = () if robots else tuple(each for each in BUILT_IN if each != DEFAULT)
     if task != DEFAULT:
-        usual = Price(task=task, eyes=ELSEWHERE, n_pixels=0, driver=driver)
+        usual = Price(task=task, setups=ELSEWHERE, n_pixels=0, driver=driver)
         usual = override(usual, n_fresh=QUICK_FRESH if quick else None)
     elif quick:
-        usual = Price(eyes=QUICK, n_fresh=QUICK_FRESH, n_pixels=0, driver=driver)
+        usual = Price(setups=QUICK, n_fresh=QUICK_FRESH, n_pixels=0, driver=driver)
     else:
         usual = Price(others=others, driver=driver)
-    config = override(usual, n_seeds=seeds, eyes=tuple(dict.fromkeys(eyes)) or None)
+    config = override(usual, n_seeds=seeds, setups=tuple(dict.fromkeys(setups)) or None)
     if seeds is not None:
         config = override(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
     return config
 
 
-def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generator[Part, Rows, Row]:
+def search_margin(
+    config: Price, task: str, setup: PriceSetup, alone: Rows
+) -> Generator[Part, Rows, Row]:
     """Search for the margin of one perception setup, and confirm it on new seeds.
 
     This generator yields the required parts one after the other. The caller sends it the rows of
@@ -257,14 +259,14 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
     Args:
         config: settings of the study.
         task: id of the environment.
-        eyes: the perception setup.
+        setup: the perception setup.
         alone: rows of the robot without a shield.
 
     Raises:
         HRCError: the workers' motion differs from that in the episodes without a shield.
     """
     tried: dict[float, Rows] = {}
-    make_part = partial(_make_part, config, task, eyes)
+    make_part = partial(_make_part, config, task, setup)
 
     def measure_rate(margin_m: float) -> Generator[Part, Rows, float]:
         tried[margin_m] = rows = yield make_part(config.list_seeds(task, config.n_seeds), margin_m)
@@ -290,9 +292,9 @@ def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generato
 
 def _play_unshielded(config: Price, task: str) -> Part:
     """Return the part with the episodes of a robot without a shield."""
-    (eyes,) = find_eyes([TRUTH])
+    (setup,) = find_setups([TRUTH])
     seeds = config.list_seeds(task, config.n_fresh, FIRST_FRESH)
-    return _make_part(config, task, eyes, seeds, 0.0, is_shielded=False)
+    return _make_part(config, task, setup, seeds, 0.0, is_shielded=False)
 
 
 def _compare_levels(
@@ -302,43 +304,43 @@ def _compare_levels(
     if not config.n_pixels or FOUR not in table[config.task]:
         return {}
     margin_m, levels = table[config.task][FOUR].margin_m, ("keypoints", "pixels")
-    (eyes,) = find_eyes([FOUR])
+    (setup,) = find_setups([FOUR])
     seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
     parts = [
-        _make_part(config, config.task, _change_level(eyes, each), seeds, margin_m)
+        _make_part(config, config.task, _change_level(setup, each), seeds, margin_m)
         for each in levels
     ]
     return dict(zip(levels, cache.make_parts(parts), strict=True))
 
 
-def _change_level(eyes: Eyes, level: str) -> Eyes:
+def _change_level(setup: PriceSetup, level: str) -> PriceSetup:
     """Return a setup with another perception level; the level is appended to the setup's name."""
-    setup = override(eyes.setup, level=level)
-    return override(eyes, name=f"{FOUR}_{level}", setup=setup)
+    perception = override(setup.perception, level=level)
+    return override(setup, name=f"{FOUR}_{level}", perception=perception)
 
 
 def _make_part(
     config: Price,
     task: str,
-    eyes: Eyes,
+    setup: PriceSetup,
     seeds: list[int],
     margin_m: float,
     is_shielded: bool = True,
 ) -> Part:
     """Return the part with the episodes of a setup with one margin."""
-    sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
+    played = {name: each for name, each in asdict(setup).items() if name not in ("words", "group")}
     n_steps, driver = config.count_steps(task), config.driver
     made_of = {
         "people": PEOPLE, "task": task, "seeds": seeds, "n_steps": n_steps,
-        "eyes": sight, "margin_m": margin_m, "shield": SHIELD if is_shielded else "",
-        "estimator": hash_source(find_estimator(eyes.setup.estimator).make),
+        "setup": played, "margin_m": margin_m, "shield": SHIELD if is_shielded else "",
+        "estimator": hash_source(find_estimator(setup.perception.estimator).make),
         **driver.settings(),
     }  # fmt: skip
     role = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
     suffix = f"{1e4 * margin_m:+.0f}" if is_shielded else "unshielded"
     driver = override(driver, agent=carried(driver.agent))
-    make = partial(play_episodes, eyes, task, n_steps, is_shielded, driver, seeds, margin_m)
-    label = f"{task}.{eyes.name}.{role}.{suffix}"
+    make = partial(play_episodes, setup, task, n_steps, is_shielded, driver, seeds, margin_m)
+    label = f"{task}.{setup.name}.{role}.{suffix}"
     return Part(label, make, make_key(made_of, config.depends), {"margin_m": margin_m})
 
 
@@ -360,10 +362,10 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
             "pixels": [FIRST_PIXELS + k for k in range(config.n_pixels)],
         }[role]
         known, level = (FOUR, name.removeprefix(f"{FOUR}_")) if role == "pixels" else (name, None)
-        (eyes,) = find_eyes([known])
+        (setup,) = find_setups([known])
         if level is not None:
-            eyes = _change_level(eyes, level)
-        parts.append(_make_part(config, task, eyes, seeds, margin_m, suffix != "unshielded"))
+            setup = _change_level(setup, level)
+        parts.append(_make_part(config, task, setup, seeds, margin_m, suffix != "unshielded"))
     cache.make_parts(parts)
 
 

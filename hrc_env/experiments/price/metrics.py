@@ -20,8 +20,8 @@ from hrc_env.evaluation.intervals import (
 )
 from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.price.episodes import CONTACTS
-from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import MarginSearch, draw_seeds, fit_falling_rates
+from hrc_env.experiments.price.setups import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.report import Metrics
 from hrc_env.experiments.stage import Rows
 

@@ -10,8 +10,8 @@ from hrc_env.core.results import Metric
 from hrc_env.experiments.plots import compute_error_bars, label_axes, make_figure, save
 from hrc_env.experiments.price import declaration
 from hrc_env.experiments.price.declaration import MORE, count_per_hour
-from hrc_env.experiments.price.eyes import FOUR, GROUPS, QUICK, Eyes, list_eyes
 from hrc_env.experiments.price.metrics import Played, Row
+from hrc_env.experiments.price.setups import FOUR, GROUPS, QUICK, PriceSetup, list_setups
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Metrics, Report, format_picture
 
@@ -35,8 +35,8 @@ def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics
         metrics: metrics by name.
     """
     task, table = config.task, played.table
-    eyes = [list_eyes()[name] for name in table[task]]
-    draw_price(figures / "price.png", metrics, task, eyes, config.level)
+    setups = [list_setups()[name] for name in table[task]]
+    draw_price(figures / "price.png", metrics, task, setups, config.level)
     parts = [
         format_picture(figures / "price.png", "Goals that remain at that rate of contacts, in "
                        "percent of a robot's without a shield; whiskers are 95 % intervals."),
@@ -84,23 +84,25 @@ def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) ->
     )
 
 
-def choose_bars(metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> list[Eyes]:
+def choose_bars(metrics: Metrics, task: str, setups: Sequence[PriceSetup]) -> list[PriceSetup]:
     """Return the setups of the figure by increasing throughput; if there are many, only `QUICK`."""
-    shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
+    shown = [each for each in setups if len(setups) <= len(QUICK) or each.name in QUICK]
     return sorted(shown, key=lambda each: metrics[f"{task}.{each.name}.share"].value)
 
 
-def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], level: float) -> None:
+def draw_price(
+    path: Path, metrics: Metrics, task: str, setups: Sequence[PriceSetup], level: float
+) -> None:
     """Draw a bar for each setup of `choose_bars`, with the longest on top.
 
     Args:
         path: picture file to write.
         metrics: metrics by name.
         task: id of the environment.
-        eyes: setups that have metrics in the task.
+        setups: setups that have metrics in the task.
         level: contacts in 1,000 episodes of 10 s at which setups are compared.
     """
-    shown = choose_bars(metrics, task, eyes)
+    shown = choose_bars(metrics, task, setups)
     figure = make_figure(9.2, 1.6 + 0.42 * len(shown))
     axis = figure.subplots()
     values = [metrics[f"{task}.{setup.name}.share"] for setup in shown]
@@ -121,7 +123,7 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], le
     save(figure, path)
 
 
-def _label_bars(axis: Axes, shown: Sequence[Eyes], values: Sequence[Metric]) -> None:
+def _label_bars(axis: Axes, shown: Sequence[PriceSetup], values: Sequence[Metric]) -> None:
     """Write the names of setups beside their bars, and numbers into them."""
     axis.set_yticks(range(len(shown)), [setup.words for setup in shown], fontsize=12)
     for y, value in enumerate(values):

@@ -47,7 +47,9 @@ WITHOUT = {
     "no swaps": Variant(
         "no exchanged sides", {"swap_start_probability": 1e-30, "swap_end_probability": 1.0 - 1e-16}
     ),
-    "noise as told": Variant("no learnt noise (only the detector's)", {"noise_bounds": (1.0, 1.0)}),
+    "reported noise": Variant(
+        "no learnt noise (only the detector's)", {"noise_bounds": (1.0, 1.0)}
+    ),
     "mode for mean": Variant("no step from the mode to the mean", {"mean_correction": 0.0}),
     "no widening": Variant("no wider covariance for one view", {"one_view_inflation": 1.0}),
     "no floor": Variant("no floor", {"floor_std_m": math.inf}),

@@ -18,7 +18,7 @@ TRUTH, FOUR, ONE = "truth", "particle", "one_camera"
 
 
 @dataclass(frozen=True, slots=True)
-class Eyes:
+class PriceSetup:
     """Perception of a robot, with the scale factor of the covariances that its shield receives."""
 
     name: str
@@ -27,7 +27,7 @@ class Eyes:
     """Description of the setup in tables and figures."""
     group: str
     """Group of the setup in the figure, one of `GROUPS`."""
-    setup: PerceptionSetup
+    perception: PerceptionSetup
     """Level, estimator, cameras and latency."""
     wrong: tuple[Faults, ...] = ((),)
     """Additional camera faults. Successive episodes use the elements in turn."""
@@ -40,7 +40,7 @@ class Eyes:
         Args:
             scene: name of the scene that contains the cameras.
         """
-        turns = self.setup.list_turns(RIGS[scene])
+        turns = self.perception.list_turns(RIGS[scene])
         return tuple(
             Turn(turn.cameras, (*turn.faults, *more)) for turn in turns for more in self.wrong
         )
@@ -64,10 +64,10 @@ def _fail_each(kind: str, amount: float | None = None, start_s: float = 0.0) -> 
     return tuple((FaultConfig(kind, (camera.name,), amount, start_s),) for camera in RIGS["lab"])
 
 
-def _make_late(latency_s: float, is_told: bool) -> Eyes:
+def _make_late(latency_s: float, is_told: bool) -> PriceSetup:
     ms = round(1000 * latency_s)
     stamped = "time-stamped" if is_told else "not time-stamped"
-    return Eyes(
+    return PriceSetup(
         f"late_{ms}ms{'' if is_told else '_untold'}",
         f"images {ms} ms late, {stamped}",
         "latency",
@@ -75,11 +75,11 @@ def _make_late(latency_s: float, is_told: bool) -> Eyes:
     )
 
 
-def list_eyes() -> dict[str, Eyes]:
+def list_setups() -> dict[str, PriceSetup]:
     """Return the setups by name, including every registered estimator with four cameras."""
     four, one, degree = PerceptionSetup(), PerceptionSetup(n_cameras=1), math.radians(1.0)
     estimators = (
-        Eyes(each, f"four cameras, {each}", "estimator", PerceptionSetup(estimator=each))
+        PriceSetup(each, f"four cameras, {each}", "estimator", PerceptionSetup(estimator=each))
         for each in ESTIMATORS
     )
     wrong = (
@@ -108,17 +108,17 @@ def list_eyes() -> dict[str, Eyes]:
         for key, factor in (("half_covariance", 0.5), ("twice_covariance", 2))
     )
     setups = (
-        Eyes(TRUTH, "true joints", "truth", PerceptionSetup("truth")),
+        PriceSetup(TRUTH, "true joints", "truth", PerceptionSetup("truth")),
         *estimators,
-        Eyes("three_cameras", "three cameras", "cameras", PerceptionSetup(n_cameras=3)),
-        Eyes("two_cameras", "two cameras", "cameras", PerceptionSetup(n_cameras=2)),
-        Eyes(ONE, "one camera", "cameras", one),
+        PriceSetup("three_cameras", "three cameras", "cameras", PerceptionSetup(n_cameras=3)),
+        PriceSetup("two_cameras", "two cameras", "cameras", PerceptionSetup(n_cameras=2)),
+        PriceSetup(ONE, "one camera", "cameras", one),
         *(_make_late(s, is_told) for is_told in (True, False) for s in LATE_S),
-        *(Eyes(name, words, "calibration", four, each) for name, words, each in wrong),
-        *(Eyes(n, words, "covariance", setup, covariance=k) for n, words, setup, k in scaled),
-        *(Eyes(name, words, "fault", four, each) for name, words, each in faults),
+        *(PriceSetup(name, words, "calibration", four, each) for name, words, each in wrong),
+        *(PriceSetup(n, words, "covariance", setup, covariance=k) for n, words, setup, k in scaled),
+        *(PriceSetup(name, words, "fault", four, each) for name, words, each in faults),
     )
-    return {eyes.name: eyes for eyes in setups}
+    return {each.name: each for each in setups}
 
 
 QUICK = (
@@ -133,13 +133,13 @@ ON_REQUEST = ("kalman", "paper")
 default, and `paper` takes minutes per episode."""
 
 
-def list_default_eyes() -> tuple[str, ...]:
+def list_default_setups() -> tuple[str, ...]:
     """Return the names of the setups that are compared by default."""
-    return tuple(name for name in list_eyes() if name not in ON_REQUEST)
+    return tuple(name for name in list_setups() if name not in ON_REQUEST)
 
 
-def find_eyes(names: Collection[str]) -> list[Eyes]:
+def find_setups(names: Collection[str]) -> list[PriceSetup]:
     """Return the setups with the given names; raise `ConfigError` if a name is unknown."""
-    known = list_eyes()
+    known = list_setups()
     check_names("perception setup", names, known)
     return [known[name] for name in names]
