@@ -14,6 +14,7 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -2559,15 +2560,15 @@ class Watched:
         """Begin episodes of a batch."""
         model = RobotModel(chain._made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
                            numbers["load_kg"])  # fmt: skip
-        n_robot = len(chain._made.capsule_radius_m) + len(numbers["load_kg"])
-        self._watch = incidents.IncidentMonitor(
-            batch, n_workers, capsule_names, n_robot, model, step_s
-        )
+        self._make = partial(incidents.IncidentMonitor, batch, n_workers, capsule_names,
+                             model=model, dt_s=step_s)  # fmt: skip
+        self._watch: incidents.IncidentMonitor | None = None
         self._chain = chain._made
 
     def reset(self, places: NDArray[np.int64]) -> None:
         """Begin some episodes anew."""
-        self._watch.reset(places)
+        if self._watch is not None:
+            self._watch.reset(places)
 
     def step(
         self, robot: NDArray[np.float64], robot_m: NDArray[np.float64],
@@ -2575,6 +2576,7 @@ class Watched:
         held: NDArray[np.bool_],
     ) -> dict[str, NDArray[Any]]:  # fmt: skip
         """Return what happened while capsules (B, T, K, 2, 3), (B, T, W, L, 2, 3) went so."""
+        self._watch = self._watch or self._make(n_robot=robot.shape[2])
         state = chains.robot_state(self._chain, np.zeros_like(qd), qd)
         nowhere, turn = np.zeros((*held.shape, 3)), np.zeros((*held.shape, 4))
         world = World(robot=state, objects=ObjectState(nowhere, turn, nowhere, nowhere, held))
