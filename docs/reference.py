@@ -40,6 +40,7 @@ from hrc_env.env_config import EnvConfig
 from hrc_env.env_words import EnvironmentArguments
 from hrc_env.episode_cameras import NEUTRAL
 from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
 from hrc_env.geometry.lens import Lens
 from hrc_env.observations import ObservationTerm
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
@@ -551,6 +552,8 @@ def config() -> str:
     ) + "\n"  # fmt: skip
 
 
+AVERAGE_WIDTH_M = 0.54
+"""Width of a person, as `geometry.enclosure` defines it, of the table of capsules [m]."""
 SHIELDS = """\
 # Shields
 
@@ -587,13 +590,21 @@ your own](../bring_your_own/shield.md).
 ## Guarantees
 If people are where they are estimated to be, and move no faster than the settings below assume:
 
-- The robot does not move towards a person who is closer than the margin, `margin_m`. People may
-  come closer by their own motion: the robot then moves away with `"qp"`, and stops with `"ssm"`.
+- The robot does not move towards a person whose estimated capsules are closer than the margin,
+  their protrusion (see below) plus `margin_m`. People may come closer by their own motion: the
+  robot then moves away with `"qp"`, and stops with `"ssm"`.
 - The same holds for people without a track, and for floor that no camera has seen empty.
 - Contacts that a task allows happen no faster than the region of the body tolerates.
 
 `tests/safety/test_shields.py` verifies each of these. [Results](../results.md#shield) shows how
 often estimates are wrong, and the effect.
+
+## The estimated body
+{enclosure}
+
+{capsules}
+
+`overlay="capsules"` shows these capsules in pictures.
 
 ## Constraints
 {rows}
@@ -625,6 +636,10 @@ def shields() -> str:
     heads = ("region", "clamped [N]", "hit [N]", "stiffness [N/mm]", "mass [kg]", "speed [m/s]")
     return SHIELDS.format(
         notice=NOTICE,
+        enclosure=_doc("hrc_env.geometry.enclosure"),
+        capsules=_table(
+            ("capsule", "radius of an average body [cm]", "protrusion [cm]"), list_capsules()
+        ),
         rows=_doc("hrc_env.safety.constraints"),
         guard=_doc("hrc_env.safety.built_in"),
         settings=_fields_of(ShieldConfig, "`ShieldConfig`"),
@@ -632,6 +647,21 @@ def shields() -> str:
         contact=f"`hrc_env.safety.contact`: {_doc('hrc_env.safety.contact')}",
         regions=_table(heads, regions),
     )
+
+
+def list_capsules() -> list[tuple[str, str, str]]:
+    """Return the rows of the table of the estimated body's capsules, the greater of both sides."""
+    enclosure, rows = load_enclosure(), []
+    radii_m = enclosure.radius_m + AVERAGE_WIDTH_M * enclosure.radius_per_width
+    for name in CAPSULES:
+        if name.startswith("right_"):
+            continue
+        sides = [CAPSULES.index(name), CAPSULES.index(name.replace("left_", "right_"))]
+        part, out_m = name.removeprefix("left_"), enclosure.protrusion_m[sides].max()
+        rows.append(
+            (part.replace("_", " "), f"{100 * radii_m[sides].max():.1f}", f"{100 * out_m:.1f}")
+        )
+    return rows
 
 
 def _doc(module: str) -> str:

@@ -320,15 +320,13 @@ def _find_gaps(paths: Paths) -> Floats:
 def _find_touch(paths: Paths, b: int, w: int, t: int) -> Touch:
     """Return the pair of capsules that overlaps most at physics step `t`."""
     robot, worker = paths.robot_world[b, t], paths.workers_world[b, t, w]
-    best, best_m = None, np.inf
-    for c, k in np.ndindex(len(robot), len(worker)):
+    gaps_m = np.empty((len(robot), len(worker)))
+    for c, k in np.ndindex(gaps_m.shape):
         closest = closest_parameters(robot[c, 0], robot[c, 1], worker[k, 0], worker[k, 1])
-        apart_m = np.sqrt(closest.squared_distance)
-        gap_m = apart_m - paths.robot_radius_m[c] - paths.worker_radius_m[b, w, k]
-        if gap_m < best_m:
-            best, best_m = (c, k, closest), gap_m
-    assert best is not None
-    c, k, closest = best
+        radii_m = paths.robot_radius_m[c] + paths.worker_radius_m[b, w, k]
+        gaps_m[c, k] = np.sqrt(closest.squared_distance) - radii_m
+    c, k = (int(index) for index in np.unravel_index(gaps_m.argmin(), gaps_m.shape))
+    closest = closest_parameters(robot[c, 0], robot[c, 1], worker[k, 0], worker[k, 1])
     apart = _locate(worker[k], closest.t) - _locate(robot[c], closest.s)
     normal = apart / max(float(np.linalg.norm(apart)), 1e-9)
     return Touch(c, k, closest.s, closest.t, normal)
