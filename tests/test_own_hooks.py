@@ -113,7 +113,7 @@ TASK_FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "loads": ({"is_load": lambda self, state: np.zeros(9, bool)}, "must have shape (2, 0)"),
     "signal": ({"signal": lambda self, state: "go"}, "must be a WorkerSignal or None"),
     "effects": ({"effects": lambda self, state: "go"}, "must be an Effects or None"),
-    "contact": ({"allowed_contact": lambda self, now: np.ones((9, 9))}, "segments of a body"),
+    "contact": ({"allowed_contact": lambda self, now: np.ones((9, 9))}, "capsules of a body"),
     "info": ({"info": lambda self, state: None}, "must be a Mapping"),
     "defaults": ({"defaults": [1]}, "must be a Mapping"),
     "limit": ({"max_episode_steps": "many"}, "must be a whole number"),

@@ -154,7 +154,7 @@ class ShieldConfig:
                 warnings.warn(
                     f"{name} is {getattr(self, name)} m: a negative margin takes away from the "
                     "distance that protects people.",
-                    stacklevel=3,
+                    stacklevel=4,
                 )
 
     def make_params(self) -> ShieldParams:

@@ -19,8 +19,9 @@ from hrc_env.worker.body import load_body, worker_names
 
 RNG = np.random.default_rng(0)
 JOINTS_WORLD = RNG.normal(size=(4, 2, 15, 3))
-PROOF_SEED = 9_700_000
-"""Not that of the fit, 9,600,000."""
+FIT_SEED, PROOF_SEED = 9_600_000, 9_700_000
+EVERY = 7
+"""Of the poses of episodes side by side every seventh is measured: no divisor of their number."""
 ALLOWED_M = {"head": 0.03, "hand": 0.02, "foot": 0.02, "chest": 0.03, "torso": 0.03,
              "abdomen": 0.03, "pelvis": 0.03, "neck": 0.035}  # fmt: skip
 
@@ -115,18 +116,19 @@ def test_nobody_has_no_capsules():
 
 @pytest.mark.slow
 def test_a_body_that_was_left_out_of_the_fit_protrudes_by_few_centimetres():
-    """In 95 % of the poses of other episodes than those of the committed fit."""
-    bodies = [play(name, PROOF_SEED + 1000 * k, 24) for k, name in enumerate(worker_names())]
-    for k, body in enumerate(bodies):
+    """In 95 % of the poses of other episodes than those of the fit."""
+    bodies = [play(name, FIT_SEED + 1000 * k, 24) for k, name in enumerate(worker_names())]
+    for k, name in enumerate(worker_names()):
         others = fit_enclosure([*bodies[:k], *bodies[k + 1 :]], CAPSULES)
-        protrusion_m = dict(zip(CAPSULES, measure_protrusion(others, body), strict=True))
-        for name, out_m in protrusion_m.items():
-            part = name.removeprefix("left_").removeprefix("right_")
-            assert out_m <= ALLOWED_M.get(part, 0.02), (worker_names()[k], name)
+        proof = play(name, PROOF_SEED + 1000 * k, 12)
+        protrusion_m = measure_protrusion(others, proof, EVERY)
+        for capsule, out_m in zip(CAPSULES, protrusion_m, strict=True):
+            part = capsule.removeprefix("left_").removeprefix("right_")
+            assert out_m <= ALLOWED_M.get(part, 0.02), (name, capsule)
 
 
 @pytest.mark.parametrize("worker", worker_names())
 def test_the_shields_margins_hold_what_protrudes(worker):
     body = play(worker, PROOF_SEED, 4)
-    out_m = measure_protrusion(load_enclosure(), body, every=24)
+    out_m = measure_protrusion(load_enclosure(), body, EVERY)
     assert (out_m <= load_enclosure().protrusion_m + 0.01).all()

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from hrc_env.core.skeleton import JOINT
+from hrc_env.geometry.enclosure import CAPSULE, N_CAPSULES
 from hrc_env.tasks import drywall, handover
 from hrc_env.tasks.task import find_task
 from hrc_env.world import FOOT_WORLD
 
-RIGHT = [7, 15]
+RIGHT = [CAPSULE["right_forearm"], CAPSULE["right_hand"]]
 """Forearm and hand."""
 UP = np.array([0.0, 0.0, 1.0])
 HANDLE = FOOT_WORLD + handover.MEET_M
@@ -61,8 +62,8 @@ def beliefs(task, stands_off_m, hand_off_m, tracked=(True, True)):
 def test_the_arm_of_who_takes_part_is_welcome(task, stands_off_m, hand_off_m, tracked, who):
     now = beliefs(task, stands_off_m, hand_off_m, tracked)
     welcome = find_task(task)().allowed_contact(now)
-    assert welcome.shape == (1, 2, 16)
-    expected = np.zeros((1, 2, 16), bool)
+    assert welcome.shape == (1, 2, N_CAPSULES)
+    expected = np.zeros((1, 2, N_CAPSULES), bool)
     if who is not None:
         expected[0, who, RIGHT] = True
     np.testing.assert_array_equal(welcome, expected)
@@ -86,4 +87,4 @@ def test_without_workers_nobody_is(task):
     env = gymnasium.make(task, perception="none", n_workers=0)
     env.reset(seed=1)
     now = env.unwrapped.simulation.belief
-    assert now.allowed_contact.shape == (1, 0, 16)
+    assert now.allowed_contact.shape == (1, 0, N_CAPSULES)
