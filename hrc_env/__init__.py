@@ -114,6 +114,8 @@ if TYPE_CHECKING:  # the names in `PUBLIC`, for type checkers and editors
     from hrc_env.tracking.smoother import smooth as smooth
     from hrc_env.vector.env import HRCVectorEnv as HRCVectorEnv
     from hrc_env.vector.make import make_vector as make_vector
+    from hrc_env.vector.six_tuple import CostEnv as CostEnv
+    from hrc_env.vector.six_tuple import CostVectorEnv as CostVectorEnv
     from hrc_env.world import Effects as Effects
     from hrc_env.world import TaskScene as TaskScene
     from hrc_env.world import Weld as Weld
@@ -126,6 +128,8 @@ __version__ = "0.1.0"
 PUBLIC = {
     # environments
     "AppearanceConfig": "hrc_env.scene.domain_randomization",
+    "CostEnv": "hrc_env.vector.six_tuple",
+    "CostVectorEnv": "hrc_env.vector.six_tuple",
     "EnvConfig": "hrc_env.env_config",
     "FaultConfig": "hrc_env.perception.faults.fault",
     "HRCConfig": "hrc_env.config",

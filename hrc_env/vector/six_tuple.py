@@ -1,6 +1,6 @@
 """Wrappers for safe-RL libraries in which `step` returns the cost, as in Safety-Gymnasium.
 
-    env = CostEnv(gymnasium.make("HRCReach-v0", perception="keypoints"))
+    env = hrc_env.CostEnv(gymnasium.make("HRCReach-v0", perception="keypoints"))
     observation, reward, cost, terminated, truncated, info = env.step(action)
 
 Libraries that read `info["cost"]` need no wrapper.
