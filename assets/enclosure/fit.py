@@ -114,7 +114,8 @@ def measure_width(joints_world: Points3) -> Floats:
     """Return the distance between the shoulders plus that between the hips (N,) [m]."""
     shoulders = joints_world[:, JOINT["left_shoulder"]] - joints_world[:, JOINT["right_shoulder"]]
     hips = joints_world[:, JOINT["left_hip"]] - joints_world[:, JOINT["right_hip"]]
-    return np.linalg.norm(shoulders, axis=1) + np.linalg.norm(hips, axis=1)
+    width_m: Floats = np.linalg.norm(shoulders, axis=1) + np.linalg.norm(hips, axis=1)
+    return width_m
 
 
 def measure_protrusion(enclosure: Enclosure, body: Poses, every: int = 12) -> Floats:
@@ -156,7 +157,7 @@ def _fit_head(bodies: Sequence[Poses], s: int) -> Floats:
     nose, end = np.concatenate(noses), np.concatenate(ends)
     extended = np.column_stack([nose, np.ones(len(nose))])
     maps = [np.linalg.lstsq(extended, end[:, e], rcond=None)[0].T for e in range(2)]
-    return np.stack(maps)
+    return np.array(maps, float)
 
 
 def _find_trunks(joints_world: Points3) -> tuple[Points3, Floats]:

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -34,7 +35,7 @@ def play(worker: str, seed: int, n_episodes: int = N_EPISODES) -> Poses:
     for k, task in enumerate(TASKS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            envs = gymnasium.make_vec(
+            envs: Any = gymnasium.make_vec(
                 task, num_envs=n_episodes, perception="none", config={"worker": worker},
                 num_threads=1,
             )  # fmt: skip
