@@ -184,7 +184,7 @@ def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
     theirs = {term.name: term for term in card.observation}
     ours = {term.name: term for term in list_terms(env_info)}
     renamed = {name: RENAMED[name] for name in theirs.keys() & RENAMED.keys() - ours.keys()}
-    texts += [describe_renaming(TermDict.WHAT, name, renamed)[:-1] for name in sorted(renamed)]
+    texts += [describe_renaming(TermDict.KIND, name, renamed)[:-1] for name in sorted(renamed)]
     for name in [*theirs, *(ours.keys() - theirs.keys())]:
         if name in {*renamed, *renamed.values()}:
             continue

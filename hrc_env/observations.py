@@ -449,7 +449,7 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
 class TermDict(RenamedKeys):
     """Values by observation term, with errors that name the right key for a former one."""
 
-    WHAT = "observation term"
+    KIND = "observation term"
     RENAMED = RENAMED
 
 

@@ -72,7 +72,7 @@ RENAMED = {
 class InfoDict(RenamedKeys):
     """Info of a reset or step, with errors that name the right key for a former or misspelt one."""
 
-    WHAT = "info key"
+    KIND = "info key"
     RENAMED = RENAMED
 
 
@@ -374,7 +374,7 @@ def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str
         )
     for each in given:
         if each in RENAMED:
-            raise ConfigError(describe_renaming(InfoDict.WHAT, each, RENAMED))
+            raise ConfigError(describe_renaming(InfoDict.KIND, each, RENAMED))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
             raise make_unknown_name_error("info", each, [*folders, *names])

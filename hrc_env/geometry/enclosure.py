@@ -46,8 +46,8 @@ class Enclosure(NamedTuple):
     radius_per_width: Floats
     """Radius of each capsule divided by the person's width, without the constant part (S,)."""
     width_range_m: Floats
-    """Widths of the narrowest and the widest body of the fit (2,) [m]. The width of an estimate is
-    limited to this range."""
+    """Range (2,) to which the width of an estimate is limited [m]: from that of the narrowest body
+    of the fit to 1.25 times that of the widest."""
     protrusion_m: Floats
     """Distance by which 95 % of the true surfaces protrude at most (S,) [m], for the worst of the
     bodies when each is left out of the fit in turn; not less than 0."""
@@ -97,15 +97,18 @@ def enclose(joints_world: Points3, enclosure: Enclosure | None = None) -> BodyCa
     return BodyCapsules(ends.reshape(*lead, *ends.shape[1:]), radius_m.reshape(*lead, N_CAPSULES))
 
 
-def find_velocities(joints_world: Points3, velocity_world: Velocities3) -> Velocities3:
+def find_velocities(
+    capsules: BodyCapsules, joints_world: Points3, velocity_world: Velocities3
+) -> Velocities3:
     """Return the velocities (..., S, 2, 3) of the ends of the capsules of moving bodies [m/s].
 
     Args:
+        capsules: capsules of the bodies, as `enclose` returns them.
         joints_world: positions of the joints (..., 15, 3) [m].
         velocity_world: velocities of the joints (..., 15, 3) [m/s].
     """
     later = enclose(joints_world + _STEP_S * velocity_world).ends_world
-    return (later - enclose(joints_world).ends_world) / _STEP_S
+    return (later - capsules.ends_world) / _STEP_S
 
 
 @kernel(makes_arrays=True)

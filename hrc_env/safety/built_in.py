@@ -200,7 +200,7 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
     return Bodies(
         segments=capsules.ends_world,
         radii_m=capsules.radius_m,
-        velocity=find_velocities(mean, velocity),
+        velocity=find_velocities(capsules, mean, velocity),
         cov=cov,
         age_s=estimate.age_s,
         is_located=estimate.tracked | is_lost,

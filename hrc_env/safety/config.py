@@ -84,7 +84,7 @@ class ShieldConfig:
     margin_m: float = 0.0
     """Distance subtracted from every gap [m], in addition to the distance by which a true body may
     protrude from its estimated capsules (`Enclosure.protrusion_m`). A negative value takes away
-    what protects people, which a warning says."""
+    from the distance that protects people, and gives a warning."""
     hand_margin_m: float = 0.0
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
     nearly all contacts [m]."""

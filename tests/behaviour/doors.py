@@ -1572,9 +1572,9 @@ def enclose_bodies(
     joints_world: NDArray[np.float64], velocity_world: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
     """Return the capsules about moving bodies, and how their ends move."""
-    ends_world, radius_m = enclosure.enclose(joints_world)
-    moving = enclosure.find_velocities(joints_world, velocity_world)
-    return {"ends": ends_world, "radius_m": radius_m, "velocity": moving}
+    capsules = enclosure.enclose(joints_world)
+    moving = enclosure.find_velocities(capsules, joints_world, velocity_world)
+    return {"ends": capsules.ends_world, "radius_m": capsules.radius_m, "velocity": moving}
 
 
 SHAPES = {"plane": shapes.PLANE, "box": shapes.BOX, "cylinder": shapes.CYLINDER,

@@ -89,15 +89,14 @@ def test_ends_move_as_they_do_a_moment_later():
         enclose(JOINTS_WORLD + 1e-6 * velocity).ends_world
         - enclose(JOINTS_WORLD - 1e-6 * velocity).ends_world
     ) / 2e-6
-    found = find_velocities(JOINTS_WORLD, velocity)
+    found = find_velocities(enclose(JOINTS_WORLD), JOINTS_WORLD, velocity)
     limbs = [s for s in range(N_CAPSULES) if s != CAPSULE["head"]]
     np.testing.assert_allclose(found[..., limbs, :, :], expected[..., limbs, :, :], atol=1e-6)
     body = play("worker_1", 1, n_episodes=1).joints_world[:1]
     turning = np.cross([0.0, 0.0, 1.0], body)
-    ends = enclose(body).ends_world
-    np.testing.assert_allclose(
-        find_velocities(body, turning), np.cross([0.0, 0.0, 1.0], ends), atol=2e-3
-    )
+    capsules = enclose(body)
+    expected = np.cross([0.0, 0.0, 1.0], capsules.ends_world)
+    np.testing.assert_allclose(find_velocities(capsules, body, turning), expected, atol=2e-3)
 
 
 @pytest.mark.parametrize("joints", ["left_shoulder", "left_hip", "left_elbow", "nose"])

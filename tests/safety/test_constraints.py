@@ -77,9 +77,10 @@ def shares():
 
 def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
     touch_m_s, most_m_s = touches
+    capsules = enclose(estimate.mean_world)
     bodies = Bodies(
-        *enclose(estimate.mean_world),
-        find_velocities(estimate.mean_world, estimate.velocity_world),
+        *capsules,
+        find_velocities(capsules, estimate.mean_world, estimate.velocity_world),
         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
         touch_m_s + np.zeros((1, 1, N_CAPSULES)), most_m_s + np.zeros(len(chain.capsule_link)),
         load_enclosure().joints, shares(),
@@ -96,7 +97,7 @@ def defined(chain, q, estimate, box, p, touches):
     caps, enclosure = chains.capsules(chain, q), load_enclosure()
     body = enclose(estimate.mean_world)
     limbs, radii_m = body.ends_world[0, 0], body.radius_m[0, 0]
-    moving = find_velocities(estimate.mean_world, estimate.velocity_world)[0, 0]
+    moving = find_velocities(body, estimate.mean_world, estimate.velocity_world)[0, 0]
     cov, age_s = estimate.cov_world[0, 0], estimate.age_s[0, 0]
     found, least_m = [], np.inf
     for c in range(len(caps)):
