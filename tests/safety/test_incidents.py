@@ -179,7 +179,7 @@ def test_a_cost_of_other_parts_is_refused(components, words):
         (0.14, [(0.06, 0.0)], [1]),  # near, and it comes
         (0.14, [(0.04, -1.0)], [0]),  # near, and the worker comes
         (0.30, [(0.5, 0.0)], [0]),  # far
-        (0.05, [(0.0, -1.0), (0.0, -1.0)], [0, 0]),  # it stands and is touched, however hard
+        (0.12, [(0.0, -2.0), (0.0, -3.0)], [0, 0]),  # it stands and is touched, however hard
         (0.05, [(-0.2, -1.0), (-0.2, -0.8)], [0, 0]),  # it flees and is touched softly enough
         (0.15, [(-0.2, -2.5), (-0.2, -4.0)], [0, 1]),  # it flees too late
         (0.03, [(0.5, 0.0), (0.0, -1.0)], [1, 1]),  # it moves into a hand, and stops in the touch
@@ -191,6 +191,37 @@ def test_a_step_is_unsafe_if_the_robot_endangers_somebody(gap_m, speeds, unsafe)
         line.step(*speed)
         found.append(line.is_unsafe)
     assert found == unsafe
+
+
+def test_a_robot_that_leaves_a_near_worker_for_one_far_away_is_safe():
+    line = Line(0.14, n_workers=2)
+    line.hand_m[1] = -0.8
+    found = line.step(-0.5)
+    assert found["robot_m_s"].tolist() == pytest.approx([-0.5, 0.5])
+    assert not line.is_unsafe
+
+
+def test_a_hand_that_slowed_down_before_the_touch_has_its_recent_speed():
+    line = Line(0.12)
+    for speed in (-2.0, -0.5):
+        line.step(0.0, speed)
+    hit = line.step(0.0, -0.6)[0]
+    assert hit["closing_speed_m_s"] == pytest.approx(0.6)
+    assert hit["recent_closing_speed_m_s"] == pytest.approx(2.0)
+
+
+def test_an_episode_begins_without_the_motion_of_the_last_one():
+    line = Line(0.1)
+    line.step(0.5)
+    assert line.recent.robot_world.any()
+    monitor = Simulation(2, resolve_settings(perception="none")).monitor
+    monitor.recent.robot_world[:], monitor.recent.workers_world[:] = 1.0, 1.0
+    monitor.recent.n_steps[:] = 3
+    monitor.reset(np.array([1]))
+    for values in (monitor.recent.robot_world, monitor.recent.workers_world):
+        assert values[0].all()
+        assert not values[1].any()
+    assert monitor.recent.n_steps.tolist() == [3, 0]
 
 
 def played(n_steps, batch=24, **arguments):
