@@ -3,6 +3,7 @@
 import dataclasses
 import importlib
 import inspect
+import json
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -12,6 +13,8 @@ import gymnasium
 import numpy as np
 
 from assets.emulator.calibrate import CalibrateKeypoints
+from assets.error_bounds.calibrate import LEVEL
+from assets.error_bounds.coverage import OUT as COVERAGE
 from assets.recordings.clips import AGAIN, CLIPS, Recorded
 from assets.recordings.sources import SOURCES
 from assets.recordings.synthetic import STYLES
@@ -552,6 +555,8 @@ def config() -> str:
     ) + "\n"  # fmt: skip
 
 
+SHOWN_PARTS = ("head", "chest", "upper_arm", "forearm", "hand")
+"""Parts of the body in the table of the coverage of bounds."""
 AVERAGE_WIDTH_M = 0.54
 """Width of a person, as `geometry.enclosure` defines it, of the table of capsules [m]."""
 SHIELDS = """\
@@ -590,9 +595,9 @@ your own](../bring_your_own/shield.md).
 ## Guarantees
 If people are where they are estimated to be, and move no faster than the settings below assume:
 
-- The robot does not move towards a person whose estimated capsules are closer than the margin,
-  their protrusion (see below) plus `margin_m`. People may come closer by their own motion: the
-  robot then moves away with `"qp"`, and stops with `"ssm"`.
+- The robot does not move towards a person whose estimated capsules are closer than the margin: the
+  bound on the error of the estimate (see below) plus `margin_m`. People may come closer by their
+  own motion: the robot then moves away with `"qp"`, and stops with `"ssm"`.
 - The same holds for people without a track, and for floor that no camera has seen empty.
 - Contacts that a task allows happen no faster than the region of the body tolerates.
 
@@ -611,6 +616,15 @@ often estimates are wrong, and the effect.
 
 {guard}
 
+## Bounds on errors
+{bounds}
+
+{coverage}
+
+Errors of the estimated gap in other episodes than those of the calibration, in which the robot is
+within half a metre of the part. A bound should cover {level:.1%} of them. Where no bound is
+calibrated, the constant margin holds.
+
 {settings}
 
 ## Functions
@@ -622,6 +636,26 @@ Speeds are for a transient contact with an arm of 17 kg moving mass, without a l
 
 {regions}
 """
+
+
+def _tabulate_coverage() -> str:
+    """Return the table of the coverage of the calibrated bounds, by robot and cameras."""
+    results, rows = json.loads(COVERAGE.read_text()), []
+    for name, result in results.items():
+        parts = result["parts"]
+        for part in SHOWN_PARTS:
+            row = parts[part]
+            share = f"{row['bound.covered']:.2%} ({row['bound.low']:.2%} to {row['bound.high']:.2%})"
+            rows.append((
+                name, part, f"{row['bound.episodes']:,}", f"{row['with_bound']:.1%}", share,
+                f"{100 * row['bound.mean_m']:.1f}", f"{row['constant.covered']:.2%}",
+                f"{100 * row['constant.mean_m']:.1f}",
+            ))  # fmt: skip
+    heads = (
+        "robot and cameras", "part", "episodes", "with bound", "covered (95 % interval)",
+        "mean bound [cm]", "covered by constant margin", "mean constant margin [cm]",
+    )  # fmt: skip
+    return _table(heads, rows)
 
 
 def shields() -> str:
@@ -637,6 +671,8 @@ def shields() -> str:
     return SHIELDS.format(
         notice=NOTICE,
         enclosure=_doc("hrc_env.geometry.enclosure"),
+        bounds=_doc("hrc_env.safety.error_bounds"),
+        coverage=_tabulate_coverage(), level=LEVEL,
         capsules=_table(
             ("capsule", "radius of an average body [cm]", "protrusion [cm]"), list_capsules()
         ),

@@ -102,6 +102,13 @@ class PoseEstimate:
     """Joint positions at the last detection of the worker (B, W, J, 3) [m]; NaN if there was no
     detection, or if cameras have since observed that no person is at these positions. Default: the
     means of slots with a track, otherwise NaN."""
+    n_views: Ints = None  # type: ignore[assignment]
+    """Number of cameras that located each joint where it is estimated in their last images (B, W,
+    J) (`tracking.agreement`). Pipelines with cameras measure it. Default: 0."""
+    misfit: Floats = None  # type: ignore[assignment]
+    """Sum over the cameras of the squared distances between each joint's measurement and the
+    estimate, in units of the measurement's standard deviation (B, W, J). Pipelines with cameras
+    measure it. Default: NaN, not measured."""
 
     def __post_init__(self) -> None:
         try:
@@ -123,6 +130,10 @@ class PoseEstimate:
         if given.seen_world is None:
             seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
             object.__setattr__(self, "seen_world", seen)
+        if given.n_views is None:
+            object.__setattr__(self, "n_views", np.zeros(self.age_s.shape, np.int64))
+        if given.misfit is None:
+            object.__setattr__(self, "misfit", np.full(self.age_s.shape, np.nan))
 
 
 @dataclass(frozen=True, slots=True)

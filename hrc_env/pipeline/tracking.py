@@ -21,6 +21,7 @@ from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.rigs import coverage
+from hrc_env.tracking.agreement import add_agreement
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import Estimator
@@ -244,6 +245,7 @@ class PoseTracking(PerceptionPipeline):
         shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
         shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
         looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
+        estimate = add_agreement(estimate, keypoints, age_s, self.P, self.axes[:, 2])
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 

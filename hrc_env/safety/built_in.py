@@ -44,6 +44,7 @@ from hrc_env.safety.constraints import (
     add_worker_constraints,
 )
 from hrc_env.safety.contact import CAPSULE_REGIONS, permitted_contact_speed
+from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, find_support
 from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
@@ -172,7 +173,8 @@ def build_constraints(
         slew=model.slew_rad_s2,
     )
     params, floor = config.make_params(), belief.unseen
-    add_worker_constraints(robots, _describe_bodies(belief, pose, is_lost, config), params, found)
+    bodies = describe_bodies(belief, pose, is_lost, config, params.bounds)
+    add_worker_constraints(robots, bodies, params, found)
     if floor is not None and np.isfinite(floor.possible_m).any():
         walked_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
         unseen = UnseenFloors(floor.floor_world, floor.level, floor.piece_m + HAND_M + walked_m)
@@ -180,10 +182,19 @@ def build_constraints(
     return found
 
 
-def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
+def describe_bodies(
+    belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig, bounds: ErrorBounds
+) -> Bodies:
     """Return the estimated bodies of the workers.
 
-    Lost workers (B, W) are assumed to be at rest at their last estimate.
+    Lost workers are assumed to be at rest at their last estimate, whose error is not calibrated.
+
+    Args:
+        belief: the robot's knowledge of itself and of the workers.
+        pose: poses of the robots' links and capsules.
+        is_lost: (B, W) mask of the workers that were detected once, but not recently.
+        config: kind, margins and limits.
+        bounds: calibrated bounds on the errors of segments.
     """
     estimate = belief.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
@@ -195,7 +206,8 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
         cov = np.where(lost[..., None], 0.0, cov)
         contact_m_s = np.where(lost[..., 0], 0.0, contact_m_s)
     walking_m_s = WALKING_M_S if config.worker_speed_m_s is None else config.worker_speed_m_s
-    capsules, enclosure = enclose(mean), load_enclosure()
+    capsules, enclosure, support = enclose(mean), load_enclosure(), find_support(estimate, bounds)
+    support.age_class[is_lost] = NOT_CALIBRATED
     influence = np.abs(enclosure.weights)
     return Bodies(
         segments=capsules.ends_world,
@@ -209,6 +221,7 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
         robot_share_m_s=touches.capsule_m_s,
         joints=enclosure.joints,
         shares=influence / influence.sum(-1, keepdims=True),
+        support=support,
     )
 
 

@@ -12,9 +12,12 @@ from hrc_env.core.errors import ConfigError, check_fields, check_names
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
+from hrc_env.safety.error_bounds import ErrorBounds, load_error_bounds, make_no_bounds
 
 KINDS = ("qp", "ssm", "pfl")
-MARGINS = ("margin_m", "hand_margin_m")
+MARGINS = ("constant", "conformal")
+"""Values of `ShieldConfig.margin`."""
+MAY_BE_NEGATIVE = ("margin_m", "hand_margin_m")
 """Names of the settings of `ShieldConfig` that may be negative."""
 IS_FOREARM_OR_HAND: Bools = np.array([name.endswith(("forearm", "hand")) for name in CAPSULES])
 """Mask of the capsules of a body to which `ShieldConfig.hand_margin_m` applies (S,)."""
@@ -25,6 +28,11 @@ class ShieldParams(NamedTuple):
 
     margins_m: Floats
     """Distance that is subtracted from the gap of each capsule of a body (S,) [m]."""
+    protrusion_m: Floats
+    """Distance by which each capsule of a true body may protrude (S,) [m], which is subtracted
+    where no bound on the error is calibrated."""
+    bounds: ErrorBounds
+    """Calibrated bounds on the errors of capsules."""
     n_sigmas: float
     """Uncertainty margin Z_d, in standard deviations."""
     min_uncertainty_m: float
@@ -62,8 +70,8 @@ class ShieldConfig:
     """Settings of a built-in shield: its kind, margins and limits.
 
     The clearance D is the gap between the surfaces of a robot's capsule and a segment of an
-    estimated body, minus a margin, minus the uncertainty margin Z_d, minus the distance that the
-    worker covers until the robot has stopped.
+    estimated body, minus a margin for the error of the estimate (`margin`), minus the distance that
+    the worker covers until the robot has stopped.
     """
 
     RENAMED: ClassVar[Mapping[str, str]] = {
@@ -81,9 +89,13 @@ class ShieldConfig:
     """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
     "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
     the speed that the touched region of the body tolerates."""
+    margin: str = "constant"
+    """Margin for the error of the estimate. "constant" is the distance by which a true body may
+    protrude from its estimated capsules (`Enclosure.protrusion_m`), plus the uncertainty margin
+    Z_d. "conformal" is a calibrated quantile of the error (`safety.error_bounds`), or the constant
+    margin for parts of the body to which the calibration does not apply."""
     margin_m: float = 0.0
-    """Distance subtracted from every gap [m], in addition to the distance by which a true body may
-    protrude from its estimated capsules (`Enclosure.protrusion_m`). A negative value takes away
+    """Distance subtracted from every gap [m], in addition to `margin`. A negative value takes away
     from the distance that protects people, and gives a warning."""
     hand_margin_m: float = 0.0
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
@@ -142,14 +154,19 @@ class ShieldConfig:
 
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
-        numbers = [each.name for each in fields(self) if each.name != "kind"]
+        check_names("margin of a shield", [self.margin], MARGINS)
+        if self.margin == "conformal":
+            load_error_bounds()
+        numbers = [each.name for each in fields(self) if each.name not in ("kind", "margin")]
         given = [name for name in numbers if getattr(self, name) is not None]
         for name in given:
             if not math.isfinite(getattr(self, name)):
                 raise ConfigError(f"{name} must be a finite number, got {getattr(self, name)}.")
         check_fields(self, "be positive", "deceleration_m_s2", "retreat_gain_hz")
-        check_fields(self, "not be negative", *(name for name in given if name not in MARGINS))
-        for name in MARGINS:
+        check_fields(
+            self, "not be negative", *(name for name in given if name not in MAY_BE_NEGATIVE)
+        )
+        for name in MAY_BE_NEGATIVE:
             if getattr(self, name) < 0.0:
                 warnings.warn(
                     f"{name} is {getattr(self, name)} m: a negative margin takes away from the "
@@ -161,8 +178,11 @@ class ShieldConfig:
         """Return the settings as arguments of compiled kernels."""
         speed_m_s = self.worker_speed_m_s
         margins_m = np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m)
+        bounds = load_error_bounds() if self.margin == "conformal" else make_no_bounds()
         return ShieldParams(
-            margins_m=load_enclosure().protrusion_m + margins_m,
+            margins_m=margins_m,
+            protrusion_m=load_enclosure().protrusion_m,
+            bounds=bounds,
             n_sigmas=float(self.n_sigmas),
             min_uncertainty_m=float(self.min_uncertainty_m),
             prediction_growth_m_s=float(self.prediction_growth_m_s),

@@ -4,22 +4,26 @@ For every pair of a robot's capsule and a capsule of an estimated body (`geometr
 called a segment), n is the unit vector from the robot's nearest point to the body's, and the
 clearance is
 
-    D = gap - margin - Z_d - v_h T_h,   Z_d = max(z, predicted + k seen + k' max(seen - s', 0))
+    D = gap - margin - error - v_h T_h
 
-with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
-of predicted^2 + seen^2. From `ShieldConfig` come k `n_sigmas`, k' `single_view_sigmas`, s'
-`single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is the distance by which
-a true body may protrude from the segment (`Enclosure.protrusion_m`) plus `margin_m` or
-`hand_margin_m`. If a body has not been detected recently, for example because images are delayed,
-most of the deviation is due to prediction, which overestimates it. A `seen` above s' indicates a
-part that a single camera locates, for which actual errors exceed the estimated ones. If D >= 0, the
-robot may approach at a speed from which it can stop within D (the robot's part of
-`separation.protective_distance`); if D < 0, it must retreat. Constraints that no reachable command
-violates are omitted.
+with v_h the estimated speed of the body's point along -n, T_h `ShieldConfig.worker_time_s`, and the
+margin `margin_m` or `hand_margin_m`. The error is either a calibrated quantile
+(`safety.error_bounds`) or
+
+    error = p + Z_d,   Z_d = max(z, predicted + k seen + k' max(seen - s', 0))
+
+with p the distance by which a true body may protrude from the segment (`Enclosure.protrusion_m`),
+and sigma_n = sqrt(n' Sigma n) the root of predicted^2 + seen^2. From `ShieldConfig` come k
+`n_sigmas`, k' `single_view_sigmas`, s' `single_view_std_m` and z `min_uncertainty_m`. If a body has
+not been detected recently, for example because images are delayed, most of the deviation is due to
+prediction, which overestimates it. A `seen` above s' indicates a part that a single camera locates,
+for which actual errors exceed the estimated ones. If D >= 0, the robot may approach at a speed from
+which it can stop within D (the robot's part of `separation.protective_distance`); if D < 0, it must
+retreat. Constraints that no reachable command violates are omitted.
 
 A segment that may be touched causes no retreat while its speed of approach does not exceed the
 contact speed that its region of the body tolerates. Capsules that may touch it brake within gap -
-margin - Z_d until the sum of their speed and that of the segment is below that limit. Points of
+margin - error until the sum of their speed and that of the segment is below that limit. Points of
 other capsules may approach at `creep_m_s` if D permits less.
 
 A worker without a recent detection may be anywhere within walking distance of the last detected
@@ -49,6 +53,7 @@ from hrc_env.core.vacancy import POSSIBLE, STATURE_M
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.distances import closest_parameters
 from hrc_env.safety.config import ShieldParams
+from hrc_env.safety.error_bounds import Support, find_error_bound
 
 MAX_CONSTRAINTS = 32
 """Maximum number of constraints of one robot; if there are more, the tightest are kept."""
@@ -107,6 +112,8 @@ class Bodies(NamedTuple):
     """Indices of the joints on which the end points depend (S, 2, T)."""
     shares: Floats
     """Influence of these joints on the end points (S, 2, T), with the sum 1 for each."""
+    support: Support
+    """What determines the calibrated bounds on the errors of segments (B, W, S)."""
 
 
 class UnseenFloors(NamedTuple):
@@ -171,8 +178,12 @@ class Segment(NamedTuple):
     """Covariance of each joint's position (J, 3, 3) [m^2]."""
     age_s: Floats
     """Time since each joint was last supported by a measurement (J,) [s]."""
-    margin_m: float
-    """Distance that is subtracted from every gap [m]."""
+    index: int
+    """Index of the segment."""
+    error_factor: float
+    """Expected error divided by the standard deviation."""
+    age_class: int
+    """Class of the segment's age, or `NOT_CALIBRATED`."""
 
 
 class Nearest(NamedTuple):
@@ -228,18 +239,17 @@ def add_worker_constraints(
                 continue
             moved = bodies.moved_m[e, w]
             for s in range(n_segments):
-                segment = select_segment(bodies, params, e, w, s)
+                segment = select_segment(bodies, e, w, s)
                 bound_capsule(segment.ends, segment.radius_m, limbs[s])
                 limbs[s, 4] = bound_deduction(segment, params) + moved
             for c, s in np.ndindex(n_caps, n_segments):
                 if sphere_gap(rods[c], limbs[s]) > rods[c, 4] + limbs[s, 4]:
                     continue
-                segment = select_segment(bodies, params, e, w, s)
+                segment = select_segment(bodies, e, w, s)
                 nearest = find_nearest(robots.capsules[e, c], segment.ends, point, normal)
                 towards = project_motion(segment, nearest.along, normal)
-                z_d = find_uncertainty(towards.std_m, find_segment_age(segment), params) + moved
                 gap = nearest.distance_m - robots.radii_m[c] - segment.radius_m
-                near = gap - segment.margin_m - z_d
+                near = gap - find_margin(segment, towards.std_m, params) - moved
                 clear = near - find_travel(towards.speed_m_s, params)
                 out.clearance_m[e] = min(out.clearance_m[e], clear)
                 link = int(robots.links[c])
@@ -346,7 +356,7 @@ def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldPara
 
 
 @kernel(makes_arrays=True)
-def select_segment(bodies: Bodies, params: ShieldParams, e: int, w: int, s: int) -> Segment:
+def select_segment(bodies: Bodies, e: int, w: int, s: int) -> Segment:
     """Return segment `s` of worker `w` in environment `e`."""
     return Segment(
         bodies.segments[e, w, s],
@@ -356,7 +366,9 @@ def select_segment(bodies: Bodies, params: ShieldParams, e: int, w: int, s: int)
         bodies.shares[s],
         bodies.cov[e, w],
         bodies.age_s[e, w],
-        params.margins_m[s],
+        s,
+        bodies.support.factor[e, w, s],
+        bodies.support.age_class[e, w, s],
     )
 
 
@@ -374,9 +386,29 @@ def bound_deduction(segment: Segment, params: ShieldParams) -> float:
             S = segment.cov[segment.joints[end, k]]
             of_end += segment.shares[end, k] * (S[0, 0] + S[1, 1] + S[2, 2])
         variance = max(variance, of_end)
-    std_m = math.sqrt(variance)
-    margin = segment.margin_m + std_m
-    return margin + find_uncertainty(std_m, 0.0, params) + find_travel(math.sqrt(squared), params)
+    std_m, bounds = math.sqrt(variance), params.bounds
+    error_m = params.protrusion_m[segment.index] + std_m + find_uncertainty(std_m, 0.0, params)
+    if segment.age_class >= 0:
+        error_m = max(error_m, bounds.bound_m[segment.index, segment.age_class, -1])
+    margin_m = params.margins_m[segment.index] + error_m
+    return margin_m + find_travel(math.sqrt(squared), params)
+
+
+@kernel
+def find_margin(segment: Segment, std_m: float, params: ShieldParams) -> float:
+    """Return the distance to subtract from the gap of a segment, for the error of its estimate [m].
+
+    Args:
+        segment: the segment of an estimated body.
+        std_m: standard deviation of the position along n [m].
+        params: margins and calibrated bounds.
+    """
+    s = segment.index
+    constant_m = params.protrusion_m[s]
+    constant_m += find_uncertainty(std_m, find_segment_age(segment), params)
+    expected_m = segment.error_factor * std_m
+    error_m = find_error_bound(params.bounds, s, segment.age_class, expected_m, constant_m)
+    return params.margins_m[s] + error_m
 
 
 @kernel
@@ -515,7 +547,7 @@ def bound_touch(
     """Return the maximum speed of approach to a segment that may be touched [m/s].
 
     Args:
-        near_m: gap - margin - Z_d [m].
+        near_m: gap - margin - error [m].
         touch_m_s: allowed speed of the robot in the touch [m/s]; with 0 it only makes small
             corrections.
         braking_m_s2: maximum deceleration of the point [m/s^2].

@@ -27,6 +27,13 @@ from hrc_env.safety.constraints import (
     add_floor_constraints,
     add_worker_constraints,
 )
+from hrc_env.safety.error_bounds import (
+    MAX_MISFIT,
+    MAX_VIEWS,
+    MIN_SHARE,
+    ErrorBounds,
+    find_support,
+)
 from hrc_env.scene.build import build
 from hrc_env.scene.limits import slew_rad_s2
 
@@ -46,6 +53,7 @@ def somebody(middle, speed_m_s=0.6):
     return PoseEstimate(
         mean[None, None], cov[None, None], velocity[None, None],
         RNG.choice([0.0, 0.04], (1, 1, 15)), np.ones((1, 1), bool),
+        n_views=RNG.integers(0, 5, (1, 1, 15)), misfit=RNG.uniform(0.0, 10.0, (1, 1, 15)),
     )  # fmt: skip
 
 
@@ -75,23 +83,55 @@ def shares():
     return weights / weights.sum(-1, keepdims=True)
 
 
-def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
+def some_bounds():
+    """Bounds of which some capsules, ages and expected errors have none."""
+    rng = np.random.default_rng(3)
+    shape = N_CAPSULES, 2, 3
+    expected_m = np.sort(rng.uniform(0.0, 0.15, shape), axis=-1)
+    expected_m[rng.random(shape[:2]) < 0.2] = -np.inf
+    return ErrorBounds(
+        np.array([0.02, 0.05]), rng.uniform(1.0, 2.0, (N_CAPSULES, len(MAX_VIEWS) + 1)),
+        rng.uniform(1.0, 2.0, (N_CAPSULES, len(MAX_MISFIT) + 1)), expected_m,
+        np.sort(rng.uniform(-0.05, 0.3, shape), axis=-1),
+    )  # fmt: skip
+
+
+def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0, bounds=None):
     touch_m_s, most_m_s = touches
-    capsules = enclose(estimate.mean_world)
+    capsules, params = enclose(estimate.mean_world), config.make_params()
+    params = params._replace(bounds=bounds or params.bounds)
     bodies = Bodies(
         *capsules,
         find_velocities(capsules, estimate.mean_world, estimate.velocity_world),
         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
         touch_m_s + np.zeros((1, 1, N_CAPSULES)), most_m_s + np.zeros(len(chain.capsule_link)),
-        load_enclosure().joints, shares(),
+        load_enclosure().joints, shares(), find_support(estimate, params.bounds),
     )  # fmt: skip
     found = no_constraints(chain, box)
-    add_worker_constraints(robots_of(chain, q, box), bodies, config.make_params(), found)
+    add_worker_constraints(robots_of(chain, q, box), bodies, params, found)
     n = int(found.n_rows[0])
     return found.J[0, :n], found.b[0, :n], found.clearance_m[0]
 
 
-def defined(chain, q, estimate, box, p, touches):
+def bound_of(bounds, s, sigma, estimate):
+    """The calibrated bound by its definition, or None."""
+    joints = {
+        j for j, share in zip(load_enclosure().joints[s].ravel(), shares()[s].ravel(), strict=True)
+        if share > MIN_SHARE
+    }  # fmt: skip
+    n_views = min(estimate.n_views[0, 0, j] for j in joints)
+    misfit = max(estimate.misfit[0, 0, j] for j in joints)
+    age_s = max(estimate.age_s[0, 0, j] for j in joints)
+    expected = sigma * bounds.view_factor[s, sum(n_views > limit for limit in MAX_VIEWS)]
+    expected *= bounds.misfit_factor[s, sum(misfit > limit for limit in MAX_MISFIT)]
+    for age, limit_s in enumerate(bounds.max_age_s):
+        if age_s <= limit_s:
+            rows = zip(bounds.expected_m[s, age], bounds.bound_m[s, age], strict=True)
+            return next((bound for edge, bound in rows if expected <= edge), None)
+    return None
+
+
+def defined(chain, q, estimate, box, p, touches, bounds=None):
     """The rows by their definition, pair by pair, and the least D of all pairs."""
     (low, high, slew), (touch_m_s, most_m_s) = box, touches
     caps, enclosure = chains.capsules(chain, q), load_enclosure()
@@ -110,7 +150,6 @@ def defined(chain, q, estimate, box, p, touches):
             Sigma = (1 - t) * of_ends[0] + t * of_ends[1]
             gap = math.sqrt(squared) - chain.capsule_radius_m[c] - radii_m[s]
             margin = p.hand_margin_m if name.endswith(("forearm", "hand")) else p.margin_m
-            margin += enclosure.protrusion_m[s]
             sigma = math.sqrt(n @ Sigma @ n)
             ages_s = age_s[enclosure.joints[s][shares()[s] > 0]]
             predicted = min(sigma, p.prediction_growth_m_s * ages_s.min())
@@ -120,9 +159,11 @@ def defined(chain, q, estimate, box, p, touches):
                 + p.n_sigmas * seen
                 + p.single_view_sigmas * max(seen - p.single_view_std_m, 0)
             )
-            z_d = max(z_d, p.min_uncertainty_m)
+            error = enclosure.protrusion_m[s] + max(z_d, p.min_uncertainty_m)
+            calibrated = bound_of(bounds, s, sigma, estimate) if bounds else None
+            error = error if calibrated is None else calibrated
             travel = (max(v_h, 0) + p.worker_speed_margin_m_s) * (p.worker_time_s + p.latency_s)
-            clear = gap - margin - z_d - travel
+            clear = gap - margin - error - travel
             least_m = min(least_m, clear)
             row = n @ moved(chain, q, c, u)
             a = min(p.deceleration_m_s2, max(np.abs(row) @ slew, 1e-9))
@@ -132,7 +173,7 @@ def defined(chain, q, estimate, box, p, touches):
             left_m_s = touch_m_s[s] - max(v_h, 0)
             if left_m_s > 0:
                 share_m_s = min(left_m_s, most_m_s[c])
-                brakes = math.sqrt(share_m_s**2 + 2 * a * max(gap - margin - z_d, 0))
+                brakes = math.sqrt(share_m_s**2 + 2 * a * max(gap - margin - error, 0))
                 allowed = max(share_m_s, brakes - a * p.reaction_s)
                 bound = max(bound, allowed if share_m_s else p.creep_m_s)
             if bound < np.maximum(row * low, row * high).sum():
@@ -151,9 +192,10 @@ def moved(chain, q, c, u, step=1e-6):
     return np.stack([(point(q + d) - point(q - d)) / (2 * step) for d in steps], -1)
 
 
+@pytest.mark.parametrize("bounds", [None, some_bounds()], ids=["constant", "calibrated"])
 @pytest.mark.parametrize("touched", [0.0, 0.5])
 @pytest.mark.parametrize("robot", ["ur10e_like", "mobile_base"])
-def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, touched):
+def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, touched, bounds):
     """Whether some segments may be touched, by some capsules at some speed, or none."""
     scene = build(robot=robot)
     chain, slew = scene.chain, slew_rad_s2(scene)
@@ -168,8 +210,8 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         touch_m_s = RNG.uniform(0.3, 1.5, N_CAPSULES) * (RNG.random(N_CAPSULES) < touched)
         most_m_s = RNG.choice([0.0, 0.25, np.inf], len(chain.capsule_link))
         given = chain, q, estimate, (low, high, slew), CONFIG, (touch_m_s, most_m_s)
-        J, b, least_m = rows_of(*given)
-        expected, all_m = defined(*given)
+        J, b, least_m = rows_of(*given, bounds=bounds)
+        expected, all_m = defined(*given, bounds)
         np.testing.assert_allclose(np.sort(b), expected[:MAX_CONSTRAINTS, 0], atol=1e-6)
         if len(expected) <= MAX_CONSTRAINTS:
             rows = sorted(np.column_stack([b, J]).round(4).tolist())

@@ -1,0 +1,156 @@
+"""Measure how many errors the bounds cover: python -m assets.error_bounds.coverage
+
+The episodes have other seeds than those of the calibration. Besides the robots and cameras of the
+calibration there are some to which it need not apply: a robot with the bounds themselves, fewer
+cameras, another task, rendered images. Results of former runs are kept for those that are not
+measured.
+"""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from assets.error_bounds.calibrate import (
+    DRIVES,
+    LEVEL,
+    Factors,
+    find_expected_error,
+    join_sides,
+    name_part,
+)
+from assets.error_bounds.episodes import SEEDS_APART, Drive, Errors, collect_all
+from hrc_env.core.results import write_whole
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.evaluation.intervals import bootstrap
+from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.geometry.enclosure import CAPSULES
+from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.error_bounds import ErrorBounds, load_error_bounds
+
+OUT = Path(__file__).with_name("coverage.json")
+CONFORMAL = "scripted robot, conformal shield"
+ELSEWHERE = (
+    Drive(CONFORMAL, shield=ShieldConfig("qp", margin="conformal")),
+    Drive("one camera after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=1)),
+    Drive("two cameras after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=2)),
+    Drive("handing over", shield="qp", task="HRCHandover-v0"),
+    Drive("rendered images", shield="qp", setup=PerceptionSetup("pixels")),
+)
+"""Robots and cameras that were not calibrated."""
+AVAILABLE = {drive.name: drive for drive in (*DRIVES, *ELSEWHERE)}
+"""All robots and cameras by name."""
+Coverage = Mapping[str, float]
+"""Numbers of one part of the body by name, with intervals "low" and "high"."""
+
+
+def main(
+    seed: int = 14_000_000, episodes: int = 1024, only: tuple[str, ...] = (), out: Path = OUT
+) -> None:
+    """Measure the coverage of the bounds of the package.
+
+    Args:
+        seed: seed of the first episode.
+        episodes: number of episodes of each combination of robot and cameras.
+        only: names of these combinations; none for all.
+        out: file to write.
+    """
+    console, bounds = Console(), load_error_bounds()
+    results: dict[str, Any] = json.loads(out.read_text()) if out.is_file() else {}
+    for k, (name, drive) in enumerate(AVAILABLE.items()):
+        if name in (only or AVAILABLE):
+            first = seed + SEEDS_APART * k
+            (errors,) = collect_all([drive], first, episodes, name, console)
+            command = " ".join(["python -m assets.error_bounds.coverage", *sys.argv[1:]])
+            made = {"command": command, "seed": first, "episodes": episodes}
+            results[name] = {"made": made, "parts": measure_coverage(errors, bounds)}
+            write_whole(out, json.dumps(results, indent=1) + "\n")
+    console.print(make_table(results))
+
+
+def find_bounds(sample: Errors, bounds: ErrorBounds, s: int) -> Floats:
+    """Return the bound (N,) on each error of capsule `s` [m]; NaN where none is calibrated."""
+    factors = Factors(bounds.view_factor[s], bounds.misfit_factor[s])
+    expected = find_expected_error(sample, factors)
+    ages = np.searchsorted(bounds.max_age_s, sample.age_s)
+    found = np.full(len(expected), np.nan)
+    for age in range(len(bounds.max_age_s)):
+        here = ages == age
+        of_class = np.searchsorted(bounds.expected_m[s, age], expected[here])
+        found[here] = np.append(bounds.bound_m[s, age], np.nan)[of_class]
+    return found
+
+
+def measure_coverage(errors: Sequence[Errors], bounds: ErrorBounds) -> dict[str, Coverage]:
+    """Return how many errors of each part are covered, and by what margins.
+
+    "bound" counts errors with a calibrated bound, "margin" all errors, which the constant margin
+    must cover where there is no bound, and "constant" what the constant margin alone would cover.
+    """
+    coverage: dict[str, Coverage] = {}
+    for part, sample in join_sides(errors).items():
+        s = next(k for k, name in enumerate(CAPSULES) if name_part(name) == part)
+        if not len(sample.error_m):
+            continue
+        bound_m = find_bounds(sample, bounds, s)
+        known = np.isfinite(bound_m)
+        margin_m = np.where(known, bound_m, sample.constant_m)
+        coverage[part] = {
+            "errors": len(known), "with_bound": float(known.mean()),
+            **_count_covered("bound", sample, bound_m, known),
+            **_count_covered("margin", sample, margin_m, ~np.isnan(margin_m)),
+            **_count_covered("constant", sample, sample.constant_m, ~np.isnan(margin_m)),
+        }  # fmt: skip
+    return coverage
+
+
+def _count_covered(name: str, sample: Errors, margin_m: Floats, among: Bools) -> Coverage:
+    """Return the share of errors below a margin, with its interval, and the mean margin.
+
+    The interval is computed by bootstrap over episodes.
+    """
+    if not among.any():
+        return {}
+    _, episode = np.unique(sample.episode[among], return_inverse=True)
+    n = np.bincount(episode)
+    covered = np.bincount(episode, sample.error_m[among] <= margin_m[among])
+
+    def find_share(weights: Ints) -> Floats:
+        return (weights @ covered) / (weights @ n)
+
+    share = bootstrap(find_share, len(n), "1")
+    return {
+        f"{name}.episodes": len(n), f"{name}.covered": share.value, f"{name}.low": share.low,
+        f"{name}.high": share.high, f"{name}.mean_m": float(margin_m[among].mean()),
+    }  # fmt: skip
+
+
+def make_table(results: Mapping[str, Any]) -> Table:
+    """Return the table of the coverage for each robot and part."""
+    words = {"bound": "by bounds", "margin": "with fallback", "constant": "by constant margin"}
+    table = Table("robot and cameras", "part", "errors", "with bound")
+    for each in words.values():
+        table.add_column(f"{each} (asked {LEVEL})")
+        table.add_column("mean [cm]")
+    for drive, result in results.items():
+        for part, row in result["parts"].items():
+            cells = [drive, part, f"{row['errors']:.0f}", f"{row['with_bound']:.3f}"]
+            for name in words:
+                if f"{name}.covered" in row:
+                    covered, low, high = (row[f"{name}.{k}"] for k in ("covered", "low", "high"))
+                    mean_cm = 100 * row[f"{name}.mean_m"]
+                    cells += [f"{covered:.4f} ({low:.4f}, {high:.4f})", f"{mean_cm:.1f}"]
+                else:
+                    cells += ["", ""]
+            table.add_row(*cells)
+    return table
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
