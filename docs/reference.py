@@ -645,7 +645,9 @@ def _tabulate_coverage() -> str:
         parts = result["parts"]
         for part in SHOWN_PARTS:
             row = parts[part]
-            share = f"{row['bound.covered']:.2%} ({row['bound.low']:.2%} to {row['bound.high']:.2%})"
+            share = (
+                f"{row['bound.covered']:.2%} ({row['bound.low']:.2%} to {row['bound.high']:.2%})"
+            )
             rows.append((
                 name, part, f"{row['bound.episodes']:,}", f"{row['with_bound']:.1%}", share,
                 f"{100 * row['bound.mean_m']:.1f}", f"{row['constant.covered']:.2%}",
@@ -672,7 +674,8 @@ def shields() -> str:
         notice=NOTICE,
         enclosure=_doc("hrc_env.geometry.enclosure"),
         bounds=_doc("hrc_env.safety.error_bounds"),
-        coverage=_tabulate_coverage(), level=LEVEL,
+        coverage=_tabulate_coverage(),
+        level=LEVEL,
         capsules=_table(
             ("capsule", "radius of an average body [cm]", "protrusion [cm]"), list_capsules()
         ),

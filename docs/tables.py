@@ -20,8 +20,8 @@ from typing import Any
 
 from benchmarks.studies import COMMANDS
 from hrc_env.core.results import Metric
-from hrc_env.experiments.report import Metrics, Table, format_table
 from hrc_env.core.versions import SUBSYSTEMS
+from hrc_env.experiments.report import Metrics, Table, format_table
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(

@@ -14,7 +14,7 @@ import numpy as np
 import tyro
 from rich.console import Console
 
-from assets.error_bounds.episodes import Drive, Errors, collect_all
+from assets.error_bounds.episodes import CONSTANT, Drive, Errors, collect_all
 from hrc_env.core.results import write_whole
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.setups import PerceptionSetup
@@ -28,12 +28,13 @@ from hrc_env.safety.error_bounds import (
 
 OUT = Path(__file__).parents[2] / "hrc_env" / "safety" / "error_bounds.json"
 DRIVES = (
-    Drive("scripted robot with shield", shield="qp"),
+    Drive("scripted robot with shield", shield=CONSTANT),
     Drive("scripted robot"),
     Drive("random robot", "random"),
-    Drive("scripted robot with shield, 120 ms", shield="qp",
+    Drive("scripted robot with shield, 120 ms", shield=CONSTANT,
           setup=PerceptionSetup(latency_s=0.12)),
-    Drive("scripted robot with shield, 200 ms", shield="qp", setup=PerceptionSetup(latency_s=0.2)),
+    Drive("scripted robot with shield, 200 ms", shield=CONSTANT,
+          setup=PerceptionSetup(latency_s=0.2)),
 )  # fmt: skip
 """Robots and cameras of the calibration. The robot hides people from cameras, so that errors depend
 on its motion."""

@@ -38,6 +38,7 @@ OUT = Path(__file__).with_name("coverage.json")
 CONFORMAL = "scripted robot, conformal shield"
 ELSEWHERE = (
     Drive(CONFORMAL, shield=ShieldConfig("qp", margin="conformal")),
+    Drive("true joints", shield="qp", setup=PerceptionSetup("truth")),
     Drive("one camera after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=1)),
     Drive("two cameras after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=2)),
     Drive("handing over", shield="qp", task="HRCHandover-v0"),

@@ -109,6 +109,10 @@ class PoseEstimate:
     """Sum over the cameras of the squared distances between each joint's measurement and the
     estimate, in units of the measurement's standard deviation (B, W, J). Pipelines with cameras
     measure it. Default: NaN, not measured."""
+    calibrated: Bools = None  # type: ignore[assignment]
+    """Whether bounds on the errors of such estimates are calibrated (B, W), which is the case for
+    the default estimator with the default settings and for the truth (`safety.error_bounds`).
+    Default: False."""
 
     def __post_init__(self) -> None:
         try:
@@ -134,6 +138,8 @@ class PoseEstimate:
             object.__setattr__(self, "n_views", np.zeros(self.age_s.shape, np.int64))
         if given.misfit is None:
             object.__setattr__(self, "misfit", np.full(self.age_s.shape, np.nan))
+        if given.calibrated is None:
+            object.__setattr__(self, "calibrated", np.zeros(self.tracked.shape, np.bool_))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.detector import DetectorConfig
+from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.weights import fetch_weights
@@ -30,14 +31,16 @@ from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
 from hrc_env.tracking import oracle
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig
+from hrc_env.tracking.estimators import EstimatorChoice, find_estimator, make_estimator
 from hrc_env.tracking.forecast import forecast
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
 """Names of the perception levels."""
 CAMERA_LEVELS = LEVELS[:2]
 """Perception levels with cameras."""
+CALIBRATED_ESTIMATORS = ("particle", "kalman")
+"""Names of the estimators with calibrated errors. With several cameras, they are equal."""
 EMULATED = ("darkness",)
 """Kinds of image faults that are emulated at level `keypoints`."""
 
@@ -93,9 +96,20 @@ def make_pipeline(
         prior = oracle.estimate_prior(batch, scene.n_workers, config.tracker)
         return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
-        return EmulatorPipeline(scene, batch, tracker, config, schedule)
+        pipeline = EmulatorPipeline(scene, batch, tracker, config, schedule)
+        pipeline.is_calibrated = has_calibrated_errors(estimator, config)
+        return pipeline
     lender = like if isinstance(like, PixelPipeline) else None
     return PixelPipeline(scene, batch, tracker, config, schedule, lender)
+
+
+def has_calibrated_errors(estimator: EstimatorChoice, config: HRCConfig) -> bool:
+    """Return whether the bounds of `safety.error_bounds` apply to an estimator's errors.
+
+    They were calibrated for the default estimator with the default settings.
+    """
+    is_default = config.tracker == ParticleConfig() and config.emulator == EmulatorConfig()
+    return is_default and find_estimator(estimator).name in CALIBRATED_ESTIMATORS
 
 
 @dataclass(frozen=True, slots=True)

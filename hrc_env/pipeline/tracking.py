@@ -191,6 +191,8 @@ class PoseTracking(PerceptionPipeline):
         self.frozen = make_frozen(batch, n_cameras)
         self.monitored = make_monitor(batch, n_cameras)
         self.presence = Presence(batch, n_workers, setup.coverage)
+        self.is_calibrated = False
+        """Whether bounds on the errors of the estimates are calibrated."""
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
         """(C, 3) principal point (x, y) and focal length of each camera [px]."""
 
@@ -246,6 +248,7 @@ class PoseTracking(PerceptionPipeline):
         shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
         looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         estimate = add_agreement(estimate, keypoints, age_s, self.P, self.axes[:, 2])
+        estimate.calibrated[:] = self.is_calibrated
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 

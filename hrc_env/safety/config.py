@@ -89,11 +89,11 @@ class ShieldConfig:
     """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
     "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
     the speed that the touched region of the body tolerates."""
-    margin: str = "constant"
-    """Margin for the error of the estimate. "constant" is the distance by which a true body may
-    protrude from its estimated capsules (`Enclosure.protrusion_m`), plus the uncertainty margin
-    Z_d. "conformal" is a calibrated quantile of the error (`safety.error_bounds`), or the constant
-    margin for parts of the body to which the calibration does not apply."""
+    margin: str = "conformal"
+    """Margin for the error of the estimate. "conformal" is a calibrated quantile of the error
+    (`safety.error_bounds`), or the constant margin for parts of the body to which the calibration
+    does not apply. "constant" is the distance by which a true body may protrude from its estimated
+    capsules (`Enclosure.protrusion_m`), plus the uncertainty margin Z_d."""
     margin_m: float = 0.0
     """Distance subtracted from every gap [m], in addition to `margin`. A negative value takes away
     from the distance that protects people, and gives a warning."""
@@ -155,8 +155,6 @@ class ShieldConfig:
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
         check_names("margin of a shield", [self.margin], MARGINS)
-        if self.margin == "conformal":
-            load_error_bounds()
         numbers = [each.name for each in fields(self) if each.name not in ("kind", "margin")]
         given = [name for name in numbers if getattr(self, name) is not None]
         for name in given:
@@ -174,15 +172,22 @@ class ShieldConfig:
                     stacklevel=4,
                 )
 
+    def load_bounds(self) -> ErrorBounds:
+        """Return the calibrated bounds on errors; with constant margins, there are none.
+
+        Raises:
+            ConfigError: the bounds are missing or were made with another version of a subsystem.
+        """
+        return load_error_bounds() if self.margin == "conformal" else make_no_bounds()
+
     def make_params(self) -> ShieldParams:
         """Return the settings as arguments of compiled kernels."""
         speed_m_s = self.worker_speed_m_s
         margins_m = np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m)
-        bounds = load_error_bounds() if self.margin == "conformal" else make_no_bounds()
         return ShieldParams(
             margins_m=margins_m,
             protrusion_m=load_enclosure().protrusion_m,
-            bounds=bounds,
+            bounds=self.load_bounds(),
             n_sigmas=float(self.n_sigmas),
             min_uncertainty_m=float(self.min_uncertainty_m),
             prediction_growth_m_s=float(self.prediction_growth_m_s),

@@ -10,8 +10,9 @@ the standard deviation along the line, times factors for the number of views and
 10.1080/01621459.2017.1307116).
 
 The quantiles are in `error_bounds.json`, which `python -m assets.error_bounds.calibrate` computes.
-They hold for what was calibrated: a capsule whose part, age or expected error was not, or whose
-agreement was not measured, has no bound. Then the constants of `ShieldConfig` apply.
+They hold for what was calibrated (`PoseEstimate.calibrated`): a capsule of another estimator's
+body, or whose part, age or expected error was not calibrated, has no bound. Then the constants of
+`ShieldConfig` apply.
 """
 
 import json
@@ -135,6 +136,7 @@ def find_support(estimate: PoseEstimate, bounds: ErrorBounds) -> Support:
     if np.isfinite(bounds.max_age_s[-1]):
         counts = find_joints_that_count()
         _find_support(estimate.n_views, estimate.misfit, estimate.age_s, counts, bounds, support)
+        support.age_class[~estimate.calibrated] = NOT_CALIBRATED
     return support
 
 

@@ -45,16 +45,19 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
     """Return the shield for a name, settings or a function; for None, return None.
 
     Raises:
-        ConfigError: no shield has this name, a setting is invalid, or the function has other
-            parameters.
+        ConfigError: no shield has this name, a setting is invalid, the function has other
+            parameters, or the calibrated bounds on errors are missing or out of date.
     """
     if isinstance(shield, str):
         if shield not in SHIELDS:
             raise make_unknown_name_error("shield", shield, SHIELDS)
+        if shield in PRESETS:
+            PRESETS[shield].load_bounds()
         return SHIELDS[shield]
     if is_mapping(shield):
         shield = from_mapping(ShieldConfig, shield, "shield.")
     if isinstance(shield, ShieldConfig):
+        shield.load_bounds()
         return partial(limit_command, config=shield)
     if shield is not None and not callable(shield):
         raise ConfigError(

@@ -27,6 +27,8 @@ def estimate_from_truth(truth: WorkerTruth) -> PoseEstimate:
         velocity_world=truth.velocity_world.copy(),
         age_s=np.zeros(shape),
         tracked=np.ones(shape[:-1], bool),
+        misfit=np.zeros(shape),
+        calibrated=np.ones(shape[:-1], bool),
     )
 
 

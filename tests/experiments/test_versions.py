@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core import versions
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.versions import SUBSYSTEMS, read_versions
 from hrc_env.experiments.versions import check_subsystems, hash_source, make_key, select_versions
 from hrc_env.tracking.estimators import find_estimator

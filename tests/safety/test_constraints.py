@@ -38,7 +38,7 @@ from hrc_env.scene.build import build
 from hrc_env.scene.limits import slew_rad_s2
 
 RNG = np.random.default_rng(5)
-CONFIG = ShieldConfig(latency_s=0.05)
+CONFIG = ShieldConfig(margin="constant", latency_s=0.05)
 
 
 def somebody(middle, speed_m_s=0.6):
@@ -54,6 +54,7 @@ def somebody(middle, speed_m_s=0.6):
         mean[None, None], cov[None, None], velocity[None, None],
         RNG.choice([0.0, 0.04], (1, 1, 15)), np.ones((1, 1), bool),
         n_views=RNG.integers(0, 5, (1, 1, 15)), misfit=RNG.uniform(0.0, 10.0, (1, 1, 15)),
+        calibrated=np.ones((1, 1), bool),
     )  # fmt: skip
 
 

@@ -27,7 +27,7 @@ from hrc_env.safety.error_bounds import (
 )
 
 PACKAGED = Path(error_bounds.__file__).with_suffix(".json")
-CONFORMAL = ShieldConfig("qp", margin="conformal")
+CONFORMAL, CONSTANT = (ShieldConfig("qp", margin=each) for each in ("conformal", "constant"))
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +75,30 @@ def test_the_worst_joint_of_a_capsule_counts(belief, name, value):
         assert age_class == (NOT_CALIBRATED if value > 0.5 else 1)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "is_calibrated"),
+    [
+        ({}, True),
+        ({"estimator": "kalman"}, True),
+        ({"estimator": "triangulation"}, False),
+        ({"config": {"emulator": {"error_scale": 2.0}}}, False),
+        ({"config": {"tracker": {"damping": 0.4}}}, False),
+        ({"perception": "truth"}, True),
+        ({"perception": "none"}, False),
+    ],
+)
+def test_bounds_apply_to_the_default_estimator_and_settings_alone(arguments, is_calibrated):
+    envs = gymnasium.make_vec("HRCReach-v0", 2, **{"perception": "keypoints", **arguments})
+    envs.reset(seed=0)
+    for _ in range(3):
+        envs.step(np.zeros(envs.action_space.shape, np.float32))
+    estimate = envs.unwrapped.simulation.belief.estimate
+    assert (estimate.calibrated == is_calibrated).all()
+    if not is_calibrated:
+        found = find_support(estimate, load_error_bounds())
+        assert (found.age_class == NOT_CALIBRATED).all()
+
+
 def test_an_estimate_that_no_camera_supports_has_no_bound(belief):
     unknown = seen_as(seen_as(belief, **WELL), misfit=np.nan)
     assert (find_support(unknown.estimate, load_error_bounds()).age_class == NOT_CALIBRATED).all()
@@ -109,25 +133,13 @@ def test_the_clearance_is_the_gap_less_the_bound(belief, monkeypatch):
 
 
 def test_where_nothing_is_calibrated_the_constants_hold(belief, monkeypatch):
-    near, constant = seen_as(belief, **WELL), clearance(belief, ShieldConfig("qp"))
+    near, constant = seen_as(belief, **WELL), clearance(belief, CONSTANT)
     assert (clearance(near, CONFORMAL) != constant).all()
     np.testing.assert_array_equal(clearance(seen_as(near, misfit=np.nan), CONFORMAL), constant)
     old = seen_as(near, age_s=0.24)
-    np.testing.assert_array_equal(clearance(old, CONFORMAL), clearance(old, ShieldConfig("qp")))
+    np.testing.assert_array_equal(clearance(old, CONFORMAL), clearance(old, CONSTANT))
     with_bounds(monkeypatch, expected_m=np.full_like(load_error_bounds().expected_m, -np.inf))
     np.testing.assert_array_equal(clearance(near, CONFORMAL), constant)
-
-
-def test_with_the_truth_a_conformal_shield_is_the_constant_one():
-    commands = []
-    for config in (ShieldConfig("qp"), CONFORMAL):
-        envs = gymnasium.make_vec("HRCReach-v0", 4, perception="truth", shield=config)
-        envs.reset(seed=0)
-        rng = np.random.default_rng(0)
-        for _ in range(60):
-            envs.step(rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32))
-        commands.append(envs.unwrapped.shards.first.belief.command)
-    np.testing.assert_array_equal(*commands)
 
 
 @pytest.fixture
@@ -178,9 +190,10 @@ def test_without_a_file_a_conformal_margin_is_refused_and_a_constant_one_works(
     monkeypatch.setattr(error_bounds, "__file__", str(copied))
     load_error_bounds.cache_clear()
     try:
-        with pytest.raises(ConfigError, match=r"missing.*margin='constant'"):
-            ShieldConfig("qp", margin="conformal")
-        ShieldConfig("qp").make_params()
+        for shield in ("qp", "ssm", CONFORMAL, {"kind": "qp"}):
+            with pytest.raises(ConfigError, match=r"missing.*margin='constant'"):
+                gymnasium.make("HRCReach-v0", shield=shield)
+        gymnasium.make("HRCReach-v0", shield=CONSTANT)
     finally:
         load_error_bounds.cache_clear()
 
@@ -250,7 +263,7 @@ def test_a_part_with_errors_of_few_episodes_has_no_bound():
 
 @pytest.mark.slow
 def test_in_other_episodes_the_packages_bounds_cover_what_they_say():
-    errors = collect_errors(Drive("shielded", shield="qp"), seed=15_000_000, n_episodes=192)
+    errors = collect_errors(Drive("shielded", shield=CONSTANT), seed=15_000_000, n_episodes=192)
     for part, row in measure_coverage(errors, load_error_bounds()).items():
         if row["bound.episodes"] >= 100:
             assert row["bound.covered"] > 0.996, part
