@@ -60,7 +60,8 @@ def test_a_contact_is_always_beyond_the_last_level():
     assert {start.events for start in crossed.starts} == {1}
 
 
-def test_the_benchmark_writes_its_rows_and_goes_on_after_a_stop(tmp_path, end_to_end):
+@pytest.mark.slow
+def test_the_benchmark_writes_its_rows_and_goes_on_after_a_stop(tmp_path):
     short = RareBench(2, 6, 5, n_rows=6)
     metrics = run_experiment(short, tmp_path)
     names = {"counted_qp", "split_qp", "split_far"}
