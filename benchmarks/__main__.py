@@ -172,11 +172,11 @@ class RareArguments(BenchArguments):
 
     out: Path = Path("out/bench_rare")
     replications: int | None = None
-    """Number of independent replications of the splitting (default: 10, quick: 2)."""
+    """Number of independent replications of the splitting (default: 8, quick: 2)."""
     starts: int | None = None
-    """Number of futures that start at each level (default: 250, quick: 20)."""
+    """Number of futures that start at each level (default: 200, quick: 20)."""
     episodes: int | None = None
-    """Number of whole episodes in which contacts are counted (default: 5000, quick: 40)."""
+    """Number of whole episodes in which contacts are counted (default: 4000, quick: 40)."""
 
     def run(self) -> int:
         """Run the benchmark and print its table; return the exit status."""

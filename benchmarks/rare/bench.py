@@ -51,16 +51,16 @@ class RareBench:
 
     name = "bench rare"
     depends = ("env", "tracker", "emulator", "motion", "shield", "agents")
-    n_replications: int = 10
+    n_replications: int = 8
     """Number of independent replications of the splitting for each shield; their spread gives the
     interval."""
-    n_starts: int = 250
+    n_starts: int = 200
     """Number of futures at each level."""
-    n_episodes: int = 5000
+    n_episodes: int = 4000
     """Number of whole episodes with the shipped shield."""
     shields: tuple[str, ...] = tuple(SHIELDS)
     """Names of the shields."""
-    n_rows: int = 125
+    n_rows: int = 100
     """Number of environments that step together, without effect on the results."""
 
     def __post_init__(self) -> None:

@@ -56,8 +56,12 @@ def test_a_contact_is_always_beyond_the_last_level():
         seeds = np.arange(FIRST, FIRST + n)
         whole = run_stage(robot, None, seeds, None)
         crossed = run_stage(robot, None, seeds, 1e9)
-    assert len(crossed.starts) == np.count_nonzero(whole.events) > 3
-    assert {start.events for start in crossed.starts} == {1}
+        assert len(crossed.starts) == np.count_nonzero(whole.events) > 3
+        assert {start.events for start in crossed.starts} == {1}
+        kept = [start.kept for start in crossed.starts]
+        robot.branch(np.arange(len(kept)), kept, np.arange(FIRST, FIRST + len(kept)))
+        moment = robot.step()
+    assert not (np.isposinf(moment.score) & (moment.events == 1))[: len(kept)].any()
 
 
 @pytest.mark.slow

@@ -96,16 +96,26 @@ def test_an_event_in_the_last_step_counts():
     walk = Walk(4)
     start = Start((TOP - 1, N_STEPS - 1, 2), float(TOP - 1), False, 2)
     ended = start._replace(is_over=True)
-    stage = splitting.run_stage(walk, [start] * 200 + [ended], np.arange(201), None)
-    assert set(stage.events.tolist()) == {2, 3}
-    assert stage.events[-1] == 2
-    assert stage.events.sum() == pytest.approx(402 + 200 * UP, abs=25)
+    stage = splitting.run_stage(walk, [start] * 200 + [ended] * 50, np.arange(250), None)
+    assert set(stage.events[:200].tolist()) == {2, 3}
+    assert set(stage.events[200:].tolist()) == {2}
+    assert stage.events[:200].sum() == pytest.approx(400 + 200 * UP, abs=25)
+
+
+def test_a_start_beyond_the_next_level_has_reached_it():
+    """Its event may be the only one of its episode."""
+    start = Start((TOP, N_STEPS - 3, 1), np.inf, False, 1)
+    stage = splitting.run_stage(Walk(4), [start] * 20, np.arange(20), 8.5)
+    assert stage.starts == [start] * 20
+    assert stage.n_steps == 0
 
 
 def test_every_start_is_used_alike():
     found = [Start(k, 0.0, False, 0) for k in range(7)]
     used = [start.kept for start in choose_starts(found, 24, np.random.default_rng(0))]
     assert sorted(np.bincount(used).tolist()) == [3, 3, 3, 3, 4, 4, 4]
+    some = [start.kept for start in choose_starts(found, 13, np.random.default_rng(0))]
+    assert sorted(np.bincount(some).tolist()) == [1] + [2] * 6
     few = [start.kept for start in choose_starts(found, 3, np.random.default_rng(0))]
     assert len(set(few)) == 3
 
