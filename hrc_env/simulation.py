@@ -303,7 +303,8 @@ class Simulation(Stateful):
             rngs: n random generators, one for each of these environments.
         """
         for b, rng in zip(ids.tolist(), rngs, strict=True):
-            fresh = dict(zip(STREAMS, children(rng, len(STREAMS)), strict=True))
+            spawned = zip(STREAMS, children(rng, len(STREAMS)), strict=True)
+            fresh: dict[str, np.random.Generator] = dict(spawned)
             if self.measured is not None:
                 fresh[MEASURING] = fresh["task"].spawn(1)[0]
             for name, stream in fresh.items():

@@ -17,7 +17,6 @@ from hrc_env.agents.env_info import Agent, env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.safety.incidents import MOVING_M_S
-from hrc_env.step_result import Observation
 from hrc_env.vector.env import HRCVectorEnv, Kept
 
 LEVELS_S = (-0.3, -0.2, -0.13, -0.08)
@@ -35,7 +34,7 @@ class KeptEpisode(NamedTuple):
     step: int
     """Number of control steps since the episode began."""
     contacts: int
-    """Number of contacts so far in which the robot moved towards the worker."""
+    """Number of contacts towards the worker until now."""
 
 
 class ShieldedRobot:
@@ -53,7 +52,7 @@ class ShieldedRobot:
         self.agent: Agent = make_agent(AGENT, env_info(self.envs))
         self.n_steps = self.envs.task.max_episode_steps
         self.step_of, self.contacts = np.zeros(n_rows, int), np.zeros(n_rows, int)
-        self._observation: Observation | None = None
+        self._observation: Any = None
 
     @property
     def episode_h(self) -> float:

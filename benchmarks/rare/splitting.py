@@ -34,7 +34,7 @@ class Moment(NamedTuple):
     is_over: Bools
     """(B,) whether the episode has ended."""
     events: Ints
-    """(B,) number of events in the episode so far."""
+    """(B,) number of events in the episode until now."""
 
 
 class Start(NamedTuple):
@@ -47,13 +47,13 @@ class Start(NamedTuple):
     is_over: bool
     """Whether the episode ends in this state."""
     events: int
-    """Number of events in the episode so far."""
+    """Number of events in the episode until now."""
 
 
 class Process(Protocol):
-    """A batch of random processes, whose rows can be copied in the middle of their episodes.
+    """A batch of random processes, with rows that can be copied in the middle of episodes.
 
-    What happens in a row depends only on its start and its seed.
+    An episode depends only on its start and its seed.
     """
 
     n_rows: int
@@ -246,9 +246,11 @@ def estimate(replications: Sequence[Replication], per_episode: float, unit: str)
     if mean > 0:
         error = float(values.std(ddof=1)) / (mean * np.sqrt(n))
         half = float(stats.t.ppf(0.975, n - 1)) * error
-        return Metric(mean, mean * np.exp(-half), mean * np.exp(half), unit, n)
+        low, high = (float(mean * np.exp(sign * half)) for sign in (-1, 1))
+        return Metric(mean, low, high, unit, n)
     passed = np.array([(*each.reached, each.n_events) for each in replications]).sum(0)
     total = sum(each.n for each in replications)
     stuck = int(np.flatnonzero(passed == 0)[0])
     share = float(np.prod(passed[:stuck] / total)) if stuck else 1.0
-    return Metric(0.0, 0.0, per_episode * share * stats.gamma.ppf(0.975, 1.0) / total, unit, n)
+    most = float(stats.gamma.ppf(0.975, 1.0)) / total
+    return Metric(0.0, 0.0, per_episode * share * most, unit, n)

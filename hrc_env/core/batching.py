@@ -76,26 +76,29 @@ def gather(parts: Sequence[Any], bounds: Sequence[int], ids: Ints) -> Any:
     Raises:
         HRCError: a value has no entry per environment.
     """
-    own = next((kind.gather for kind in map(type, parts) if hasattr(kind, "gather")), None)
-    if own is not None:
-        return own(parts, bounds, ids)
-    first, kind, sizes = parts[0], type(parts[0]), np.diff(bounds).tolist()
-    names, is_one_kind = names_of(kind), all(type(part) is kind for part in parts)
-    if is_one_kind and isinstance(first, np.ndarray | list) and [*map(len, parts)] == sizes:
-        if is_array(first):
-            whole = np.empty((sum(sizes), *first.shape[1:]), first.dtype)
-            return np.concatenate(parts, out=whole)[ids]  # out: it keeps the class of records
-        together = [each for part in parts for each in part]
+    kinds = cast(list[Any], [*map(type, parts)])
+    for each in kinds:
+        if hasattr(each, "gather"):
+            return each.gather(parts, bounds, ids)
+    first, kind = parts[0], kinds[0]
+    names, sizes = names_of(kind), np.diff(bounds).tolist()
+    is_one_kind = all(each is kind for each in kinds)
+    has_rows = is_one_kind and kind in (np.ndarray, list) and [*map(len, parts)] == sizes
+    if has_rows and is_array(first):
+        whole = np.empty((sum(sizes), *first.shape[1:]), first.dtype)
+        return np.concatenate(parts, out=whole)[ids]  # out: it keeps the class of records
+    if has_rows:
+        together: list[Any] = [each for part in parts for each in part]
         return [together[k] for k in ids.tolist()]
     if is_one_kind and is_dict(first):
         return {name: gather([part[name] for part in parts], bounds, ids) for name in first}
-    if is_one_kind and (names or isinstance(first, tuple)):
+    if is_one_kind and (names or issubclass(kind, tuple)):
         columns = [[getattr(part, n) for part in parts] for n in names] or zip(*parts, strict=True)
         values = [gather(column, bounds, ids) for column in columns]
         return kind(*values) if names else tuple(values)
-    is_setting = is_one_kind and isinstance(first, str | float | int | None)
+    is_setting = is_one_kind and issubclass(kind, str | float | int | None)
     if is_setting and all(part == first for part in parts):
-        return first
+        return parts[0]
     raise HRCError(
         f"The state of {sizes} environments must consist of arrays and lists with an entry per "
         f"environment, and of equal settings, got {', '.join(map(describe, parts))}. Such "
@@ -133,7 +136,7 @@ def copy_arrays(value: Any) -> Any:
         return kind(*[copy_arrays(getattr(value, name)) for name in names])
     if is_list_or_tuple(value):
         return type(value)(copy_arrays(each) for each in value)
-    if type(value) is dict:
+    if is_dict(value) and kind is dict:
         return {name: copy_arrays(each) for name, each in value.items()}
     return copy.deepcopy(value)
 

@@ -114,7 +114,7 @@ def test_every_start_is_used_alike():
     found = [Start(k, 0.0, False, 0) for k in range(7)]
     used = [start.kept for start in choose_starts(found, 24, np.random.default_rng(0))]
     assert sorted(np.bincount(used).tolist()) == [3, 3, 3, 3, 4, 4, 4]
-    some = [start.kept for start in choose_starts(found, 13, np.random.default_rng(0))]
+    some = [start.kept for start in choose_starts(found, 13, np.random.default_rng(1))]
     assert sorted(np.bincount(some).tolist()) == [1] + [2] * 6
     few = [start.kept for start in choose_starts(found, 3, np.random.default_rng(0))]
     assert len(set(few)) == 3
