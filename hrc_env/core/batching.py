@@ -95,7 +95,7 @@ def gather(parts: Sequence[Any], bounds: Sequence[int], ids: Ints) -> Any:
     if is_one_kind and (names or issubclass(kind, tuple)):
         columns = [[getattr(part, n) for part in parts] for n in names] or zip(*parts, strict=True)
         values = [gather(column, bounds, ids) for column in columns]
-        return kind(*values) if names else tuple(values)
+        return kinds[0](*values) if names else tuple(values)
     is_setting = is_one_kind and issubclass(kind, str | float | int | None)
     if is_setting and all(part == first for part in parts):
         return parts[0]
