@@ -1,7 +1,7 @@
 """The command `python -m benchmarks`.
 
-It runs the benchmarks of the estimators, the detector, the speed and the motion of workers, and
-renders a gallery.
+It runs the benchmarks of the estimators, the detector, the speed, the motion of workers and rare
+contacts, and renders a gallery.
 """
 
 import sys
@@ -164,6 +164,34 @@ class PerceptionArguments(BenchArguments):
 
 
 @dataclass(frozen=True)
+class RareArguments(BenchArguments):
+    """Estimate how often shielded robots touch a worker while they move towards them.
+
+    Multilevel splitting is compared with counted contacts for the shipped shield.
+    """
+
+    out: Path = Path("out/bench_rare")
+    replications: int | None = None
+    """Number of independent replications of the splitting (default: 8, quick: 2)."""
+    starts: int | None = None
+    """Number of futures that start at each level (default: 200, quick: 20)."""
+    episodes: int | None = None
+    """Number of whole episodes in which contacts are counted (default: 4000, quick: 40)."""
+
+    def run(self) -> int:
+        """Run the benchmark and print its table; return the exit status."""
+        check_at_least("--replications", self.replications, 2)
+        check_at_least("--starts", self.starts, 1)
+        check_at_least("--episodes", self.episodes, 1)
+        from benchmarks.rare.bench import QUICK, RareBench
+
+        config = override(QUICK if self.quick else RareBench(), n_starts=self.starts)
+        return self.show(
+            override(config, n_replications=self.replications, n_episodes=self.episodes)
+        )
+
+
+@dataclass(frozen=True)
 class Gallery:
     """Render all workers, a film strip of each motion, and both scenes from all cameras."""
 
@@ -186,9 +214,9 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed and motion. Each takes --quick (minutes instead
-    of hours) and --out DIR, a folder for report.html, results.json and figures. `tracking --help`,
-    for example, describes the other options.
+    The benchmarks are tracking, perception, speed, motion and rare. Each takes --quick (minutes
+    instead of hours) and --out DIR, a folder for report.html, results.json and figures.
+    `tracking --help`, for example, describes the other options.
     """
 
     benchmark: (
@@ -196,6 +224,7 @@ class Benchmarks:
         | Annotated[PerceptionArguments, tyro.conf.subcommand("perception")]
         | Annotated[SpeedArguments, tyro.conf.subcommand("speed")]
         | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
+        | Annotated[RareArguments, tyro.conf.subcommand("rare")]
         | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     )
     """Benchmark to run."""

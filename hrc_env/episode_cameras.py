@@ -155,6 +155,10 @@ class EpisodeCameras:
         """Return a copy of the pipelines' state."""
         return self.pipeline.get_state()
 
+    def get_rows(self, ids: Ints, batch: int) -> Any:
+        """Return a copy of the pipelines' state for environments `ids`."""
+        return self.pipeline.get_rows(ids, batch)
+
     def set_state(self, state: Any) -> None:
         """Restore a state, including the separate pipelines of environments."""
         if isinstance(state, EpisodicState):

@@ -20,7 +20,7 @@ from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_shape, require
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
-from hrc_env.core.streams import children
+from hrc_env.core.streams import children, restart
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
 from hrc_env.episode_cameras import NOTHING_GIVEN, EpisodeCameras
 from hrc_env.geometry import chains
@@ -266,20 +266,49 @@ class Simulation(Stateful):
 
     def get_state(self) -> State:
         """Return a copy of the complete state, including random generators and settings."""
-        factors = {"reward_factors": self.reward_factors} if self.reward_factors else {}
-        return {"settings": self.settings, **super().get_state(), **factors}
+        return {"settings": self.settings, **super().get_state(), **self._own_factors()}
+
+    def get_rows(self, ids: Ints, batch: int) -> State:
+        """Return a copy of the state of environments `ids`, without settings."""
+        return {**super().get_rows(ids, batch), **self._own_factors()}
 
     def set_state(self, state: State) -> None:
         """Restore the exact state that `get_state` returned with the same settings."""
-        for name in {**self.settings, **state["settings"]}:
-            taken, value = state["settings"].get(name), self.settings.get(name)
-            if taken != value:
+        self.check_settings(state["settings"])
+        super().set_state(state)
+        self.reward_factors = dict(state.get("reward_factors", {}))
+
+    def check_settings(self, settings: State, *others: str) -> None:
+        """Raise `ConfigError` if a state was taken with other settings.
+
+        Args:
+            settings: the settings of the state.
+            others: names of settings that may differ.
+        """
+        for name in {**self.settings, **settings}:
+            taken, value = settings.get(name), self.settings.get(name)
+            if taken != value and name not in others:
                 raise ConfigError(
                     f"The state was taken with {name}={taken!r}, but here {name} is {value!r}. "
                     "Create the environment with the same arguments."
                 )
-        super().set_state(state)
-        self.reward_factors = dict(state.get("reward_factors", {}))
+
+    def restart_streams(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
+        """Spawn the random streams of environments `ids` anew, in the middle of their episodes.
+
+        What has been sampled for the whole episode stays: rig, faults and appearance.
+
+        Args:
+            ids: (n,) indices of the environments.
+            rngs: n random generators, one for each of these environments.
+        """
+        for b, rng in zip(ids.tolist(), rngs, strict=True):
+            spawned = zip(STREAMS, children(rng, len(STREAMS)), strict=True)
+            fresh: dict[str, np.random.Generator] = dict(spawned)
+            if self.measured is not None:
+                fresh[MEASURING] = fresh["task"].spawn(1)[0]
+            for name, stream in fresh.items():
+                restart(self.streams[name][b], stream)
 
     def draw_images(self) -> Images:
         """Render the images in the observation at the time of the sensors' last exposure."""
@@ -330,6 +359,10 @@ class Simulation(Stateful):
         """Return the positions (M, 3) of the markers of environment `b`'s task [m, world]."""
         view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
+
+    def _own_factors(self) -> State:
+        """Return the factors of reward terms as a part of the state, if there are any."""
+        return {"reward_factors": self.reward_factors} if self.reward_factors else {}
 
     def _make_people_and_scene(self, settings: Settings) -> None:
         """Make the workers and the scene; raise `ConfigError` if it lacks space for workers."""

@@ -8,14 +8,17 @@ import copy
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 
+from hrc_env.core.brought import describe
+from hrc_env.core.errors import HRCError
 from hrc_env.core.typing import Bools, Floats, Ints, is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
+ValueT = TypeVar("ValueT")
 State = dict[str, Any]
 
 
@@ -58,8 +61,74 @@ def map_arrays(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     return type(record)(*values) if names else record
 
 
+def gather(parts: Sequence[Any], bounds: Sequence[int], ids: Ints) -> Any:
+    """Return the state of environments `ids`, which may lie in different simulations.
+
+    The first axis of arrays and the entries of lists are environments; entries are not copied.
+    Numbers, texts and None are settings, which must be equal in all parts. A record with other
+    contents has its own `gather`, with these arguments.
+
+    Args:
+        parts: states of S simulations with the same settings: (nested) dictionaries and records.
+        bounds: (S + 1,) part s contains environments `bounds[s]` to `bounds[s + 1]` - 1.
+        ids: (n,) indices of environments over all parts; an environment may occur repeatedly.
+
+    Raises:
+        HRCError: a value has no entry per environment.
+    """
+    kinds = cast(list[Any], [*map(type, parts)])
+    for each in kinds:
+        if hasattr(each, "gather"):
+            return each.gather(parts, bounds, ids)
+    first, kind = parts[0], kinds[0]
+    names, sizes = names_of(kind), np.diff(bounds).tolist()
+    is_one_kind = all(each is kind for each in kinds)
+    has_rows = is_one_kind and kind in (np.ndarray, list) and [*map(len, parts)] == sizes
+    if has_rows and is_array(first):
+        whole = np.empty((sum(sizes), *first.shape[1:]), first.dtype)
+        return np.concatenate(parts, out=whole)[ids]  # out: it keeps the class of records
+    if has_rows:
+        together: list[Any] = [each for part in parts for each in part]
+        return [together[k] for k in ids.tolist()]
+    if is_one_kind and is_dict(first):
+        return {name: gather([part[name] for part in parts], bounds, ids) for name in first}
+    if is_one_kind and (names or issubclass(kind, tuple)):
+        columns = [[getattr(part, n) for part in parts] for n in names] or zip(*parts, strict=True)
+        values = [gather(column, bounds, ids) for column in columns]
+        return kinds[0](*values) if names else tuple(values)
+    is_setting = is_one_kind and issubclass(kind, str | float | int | None)
+    if is_setting and all(part == first for part in parts):
+        return parts[0]
+    raise HRCError(
+        f"The state of {sizes} environments must consist of arrays and lists with an entry per "
+        f"environment, and of equal settings, got {', '.join(map(describe, parts))}. Such "
+        "environments cannot be branched."
+    )
+
+
+def gather_entries(
+    parts: Sequence[Mapping[int, ValueT]], bounds: Sequence[int], ids: Ints
+) -> dict[int, ValueT]:
+    """Return the entries of environments `ids` in mappings that have entries for some of them.
+
+    Args:
+        parts: entries by the index of the environment within its part.
+        bounds: first environments of the parts, as in `gather`.
+        ids: (n,) indices of environments over all parts.
+
+    Returns:
+        Entries by row of `ids`.
+    """
+    known = {low + b: each for low, part in zip(bounds, parts, strict=False)
+             for b, each in part.items()}  # fmt: skip
+    return {row: known[k] for row, k in enumerate(ids.tolist()) if k in known}
+
+
 def copy_arrays(value: Any) -> Any:
-    """Return a deep copy of records, lists and generators; read-only arrays are shared."""
+    """Return a deep copy of records, lists and generators; read-only arrays are shared.
+
+    An object that occurs twice is copied twice.
+    """
     if is_array(value):
         return value.copy() if value.flags.writeable else value
     kind = cast(type[Any], type(value))
@@ -67,6 +136,8 @@ def copy_arrays(value: Any) -> Any:
         return kind(*[copy_arrays(getattr(value, name)) for name in names])
     if is_list_or_tuple(value):
         return type(value)(copy_arrays(each) for each in value)
+    if is_dict(value) and kind is dict:
+        return {name: copy_arrays(each) for name, each in value.items()}
     return copy.deepcopy(value)
 
 
@@ -94,6 +165,16 @@ class Stateful:
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
             name: part.get_state() if hasattr(part, "get_state") else copy_arrays(part)
+            for name, part in parts.items()
+        }
+
+    def get_rows(self, ids: Ints, batch: int) -> Any:
+        """Return a copy of the state of environments `ids` of a batch, as `gather` does."""
+        parts = {name: getattr(self, name) for name in self.CHANGES}
+        return {
+            name: part.get_rows(ids, batch)
+            if hasattr(part, "get_rows")
+            else copy_arrays(gather([part], [0, batch], ids))
             for name, part in parts.items()
         }
 

@@ -54,6 +54,14 @@ def aside(rng: np.random.Generator, number: int) -> np.random.Generator:
     return np.random.default_rng(SeedSequence(seeds.entropy, spawn_key=key))
 
 
+def restart(rng: np.random.Generator, fresh: np.random.Generator) -> None:
+    """Let `rng` go on with the numbers of `fresh`, a generator of the same kind.
+
+    Generators from `aside` stay the same; what they decide for an episode is therefore kept.
+    """
+    rng.bit_generator.state = fresh.bit_generator.state
+
+
 def children(rng: np.random.Generator, n: int) -> list[np.random.Generator]:
     """Return `n` generators with seeds drawn from `rng`; each call returns different ones."""
     drawn = rng.integers(0, 2**64, (n, WORDS), np.uint64)

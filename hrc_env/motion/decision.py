@@ -1,13 +1,14 @@
 """Inputs of the workers' decisions: constants, state, random numbers and free workplaces."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from hrc_env.core import batching
 from hrc_env.core.declared import Records1, Records2
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import predict_fallen_root
@@ -94,6 +95,16 @@ class MotionState:
     def mind_of(self, b: int) -> BehaviourParams:
         """Return the constants of the current episode of environment b."""
         return self.minds.get(b, self.mind)
+
+    @staticmethod
+    def gather(parts: "Sequence[MotionState]", bounds: Sequence[int], ids: Ints) -> "MotionState":
+        """Return the state of environments `ids` of several states (`batching.gather`)."""
+        return MotionState(
+            batching.gather([part.workers for part in parts], bounds, ids),
+            batching.gather([part.loads for part in parts], bounds, ids),
+            parts[0].mind,
+            batching.gather_entries([part.minds for part in parts], bounds, ids),
+        )
 
 
 @dataclass(slots=True)

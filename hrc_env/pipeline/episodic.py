@@ -5,12 +5,13 @@ pipeline if its episode differs in any of these. Because no result depends on th
 pipeline gives exactly the results of a single environment with the same rig, bit for bit.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from hrc_env.core import batching
 from hrc_env.core.batching import map_arrays, one, rows, write_rows
 from hrc_env.core.errors import require
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -63,6 +64,19 @@ class EpisodicState:
     """State of the pipeline that most environments share."""
     own: dict[int, OwnState]
     """States of the environments with a separate pipeline, by the environment's index."""
+
+    @staticmethod
+    def gather(parts: Sequence[Any], bounds: Sequence[int], ids: Ints) -> "EpisodicState":
+        """Return the state of environments `ids` (`batching.gather`).
+
+        A part may also be the state of a pipeline that all its environments share.
+        """
+        found = [each if isinstance(each, EpisodicState) else EpisodicState(each, {})
+                 for each in parts]  # fmt: skip
+        return EpisodicState(
+            batching.gather([each.shared for each in found], bounds, ids),
+            batching.gather_entries([each.own for each in found], bounds, ids),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,6 +271,13 @@ class EpisodicPipeline(PerceptionPipeline):
         """Return a copy of the state, including the cameras of separate pipelines."""
         own = {b: each.get_state() for b, each in self._own.items()}
         return EpisodicState(self.shared.get_state(), own)
+
+    def get_rows(self, ids: Ints, batch: int) -> EpisodicState:
+        """Return a copy of the state of environments `ids`."""
+        own = {
+            row: self._own[b].get_state() for row, b in enumerate(ids.tolist()) if b in self._own
+        }
+        return EpisodicState(self.shared.get_rows(ids, batch), own)
 
     def set_state(self, state: Any) -> None:
         """Restore a state, which may also be that of a pipeline shared by all environments."""

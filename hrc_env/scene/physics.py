@@ -287,6 +287,10 @@ class Physics:
         """Return the complete state (B, n), which `set_state` restores exactly."""
         return self._sims.state.copy()
 
+    def get_rows(self, ids: Ints, batch: int) -> Floats:
+        """Return the complete state (n, ...) of environments `ids` (n,)."""
+        return self._sims.state[ids]
+
     def set_state(self, state: Floats) -> None:
         """Restore a state from `get_state` of the same scene and batch size."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")

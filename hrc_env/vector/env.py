@@ -8,6 +8,7 @@ environments and threads. Results have the form of those of gymnasium's `SyncVec
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -18,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.control import check_action
-from hrc_env.core.batching import State, copy_arrays, map_arrays, one, write_rows
+from hrc_env.core.batching import State, copy_arrays, gather, map_arrays, one, write_rows
 from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -40,7 +41,9 @@ from hrc_env.vector.options import (
     OF_VECTORS,
     count_elapsed_steps,
     parse_autoreset,
+    parse_branch_seeds,
     parse_seeds,
+    parse_sources,
     parse_threads,
     parse_time_limit,
     read_options,
@@ -51,6 +54,24 @@ from hrc_env.vector.shards import Shards
 
 Step: TypeAlias = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 """Observation, rewards, terminated, truncated and infos of a step, as in gymnasium."""
+
+_OF_BRANCHES = ("_steps", "_ended", "_observation", "_options", "_fixed")
+"""Attributes of `HRCVectorEnv` that a branch takes from its source."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kept:
+    """Copies of environments in the middle of their episodes (`HRCVectorEnv.keep`)."""
+
+    settings: State
+    """Settings of the environments."""
+    simulated: State
+    """State of the simulations, with a row for each environment."""
+    own: State
+    """Attributes of the vector environment, with a row for each environment."""
+
+    def __len__(self) -> int:
+        return len(self.own["_steps"])
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
@@ -206,6 +227,69 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.pictures.take(np.ones_like(over), over)
         infos = InfoDict({**finals, **info.arrays(np.ones_like(ended))})
         return copy_arrays(observation), reward, terminated, truncated, infos
+
+    def branch(
+        self,
+        ids: Sequence[int] | Ints,
+        seeds: Sequence[int | None] | Ints,
+        kept: Sequence[Kept] = (),
+    ) -> Observation:
+        """Let environments go on from the present state of others, with new random numbers.
+
+        Environment k becomes a copy of environment `ids[k]`, in the middle of its episode, and its
+        random streams are spawned anew from `seeds[k]`. Copies with different seeds have the same
+        past and different futures, as multilevel splitting needs them; with the same seed, they
+        have the same future, with any number of threads. What was sampled for the whole episode
+        (rig, faults and appearance) stays the same, and so do time limit and options. An agent with
+        a memory must be copied, too.
+
+        Args:
+            ids: (num_envs,) index of the environment that each one becomes. Indices from `num_envs`
+                on count the environments in `kept`.
+            seeds: (num_envs,) seeds, all different. None is for an environment that becomes itself
+                and is not changed, bit for bit.
+            kept: environments that `keep` has returned.
+
+        Returns:
+            Observations of all environments.
+
+        Raises:
+            ConfigError: an index or a seed is invalid, `kept` belongs to an environment with other
+                arguments, or `reset` has not been called; no environment is changed then.
+            HRCError: the state of the task or the estimator has no row per environment.
+        """
+        bounds = [0, self.num_envs, *(self.num_envs + np.cumsum([len(each) for each in kept]))]
+        sources = parse_sources(ids, self.num_envs, bounds[-1])
+        given = parse_branch_seeds(seeds, sources)
+        for each in kept:
+            self.shards.first.check_settings(each.settings, "batch")
+        every = (self.keep(range(self.num_envs)), *kept)
+        own = gather([each.own for each in every], bounds, sources)
+        seeded = [k for k, seed in enumerate(given) if seed is not None]
+        streams = {k: seeding.np_random(given[k]) for k in seeded}
+        self.shards.set_rows([each.simulated for each in every], bounds, sources)
+        self.shards.restart_streams(np.array(seeded, int), [streams[k][0] for k in seeded])
+        self._streams = [streams.get(k, own) for k, own in enumerate(self._streams)]
+        for name, value in own.items():
+            setattr(self, name, value)
+        return copy_arrays(self._observation)
+
+    def keep(self, ids: Sequence[int] | Ints) -> Kept:
+        """Return copies of environments in the middle of their episodes, for `branch`.
+
+        Args:
+            ids: (n,) indices of the environments.
+
+        Raises:
+            ConfigError: an index is invalid, or `reset` has not been called.
+        """
+        self.refuse_closed()
+        if self._observation is None:
+            raise ConfigError("Call reset() before keep() or branch().")
+        rows = parse_sources(ids, np.size(ids), self.num_envs)
+        own = {name: getattr(self, name) for name in _OF_BRANCHES}
+        taken = gather([own], [0, self.num_envs], rows)
+        return Kept(self.shards.first.settings, self.shards.get_rows(rows), taken)
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
         """Convert indices in infos to names of activities, bodies, contacts and cameras.

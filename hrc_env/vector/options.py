@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import (
     ConfigError,
     check_integer,
@@ -63,8 +64,16 @@ def parse_threads(num_threads: int | None) -> int:
     return n_threads
 
 
-def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """Return the seed of each environment, or None if its random stream continues."""
+def parse_seeds(
+    seed: int | Sequence[int | None] | None, num_envs: int, name: str = "seed"
+) -> list[int | None]:
+    """Return the seed of each environment, or None if its random stream continues.
+
+    Args:
+        seed: seed of the first environment, or a list with a seed for each.
+        num_envs: number of environments.
+        name: name of the argument, for the error message.
+    """
     if seed is None:
         return [None] * num_envs
     if isinstance(seed, (int, np.integer)):
@@ -73,10 +82,64 @@ def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[
     valid = [each is None or (isinstance(each, (int, np.integer)) and each >= 0) for each in given]
     if len(given) != num_envs or not all(valid):
         raise ConfigError(
-            f"seed must be a whole number >= 0 or a list of {num_envs} of them (None continues "
+            f"{name} must be a whole number >= 0 or a list of {num_envs} of them (None continues "
             f"with the environment's random stream), got {seed!r}."
         )
     return [None if each is None else int(each) for each in given]
+
+
+def parse_sources(ids: Any, n: int, num_envs: int) -> Ints:
+    """Return indices (n,) of environments.
+
+    Args:
+        ids: indices as given by the user.
+        n: required number of indices.
+        num_envs: number of environments.
+
+    Raises:
+        ConfigError: the number of indices is wrong, or one of them is not valid.
+    """
+    try:
+        given = np.asarray(ids)
+    except ValueError:  # rows of different lengths
+        given = np.zeros(0)
+    is_whole = given.shape == (n,) and np.issubdtype(given.dtype, np.integer)
+    if not is_whole or not n or not ((given >= 0) & (given < num_envs)).all():
+        raise ConfigError(
+            f"ids must be {n or 'one or more'} whole numbers from 0 to {num_envs - 1}, indices of "
+            f"environments, got {describe(ids)}."
+        )
+    return given.astype(np.int64)
+
+
+def parse_branch_seeds(seeds: Any, ids: Ints) -> list[int | None]:
+    """Return the seed of each branch, or None for an environment that is not changed.
+
+    Args:
+        seeds: seeds as given by the user.
+        ids: (B,) index of the environment that each one becomes.
+
+    Raises:
+        ConfigError: a seed is invalid, occurs twice, or is missing for a copy.
+    """
+    if not isinstance(seeds, Iterable):
+        raise ConfigError(
+            f"seeds must be a list of {len(ids)} seeds, one per environment, got {describe(seeds)}."
+        )
+    given = parse_seeds(list(seeds), len(ids), "seeds")
+    for k, (source, seed) in enumerate(zip(ids.tolist(), given, strict=True)):
+        if seed is None and source != k:
+            raise ConfigError(
+                f"seeds[{k}] is None, but environment {k} becomes a copy of environment {source} "
+                "and must not share its random numbers: give it a seed. None is for an environment "
+                "that is not changed."
+            )
+    used = [seed for seed in given if seed is not None]
+    if twice := sorted({seed for seed in used if used.count(seed) > 1}):
+        raise ConfigError(
+            f"seeds must differ, so that branches are independent, got {twice[0]} more than once."
+        )
+    return given
 
 
 @dataclass(frozen=True, slots=True, eq=False)

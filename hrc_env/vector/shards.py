@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import State
+from hrc_env.core.batching import State, gather
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.reset_options import Fixed
@@ -101,6 +101,41 @@ class Shards:
             )
         for part, saved in zip(self.parts, state, strict=True):
             part.set_state(saved)
+
+    def get_rows(self, ids: Ints) -> State:
+        """Return a copy of the state of environments `ids` (n,), with a row for each."""
+        shard = np.searchsorted(self.bounds, ids, "right") - 1
+        inside = [ids[shard == s] - first for s, first in enumerate(self.bounds[:-1])]
+        parts = [
+            part.get_rows(own, part.batch) for part, own in zip(self.parts, inside, strict=True)
+        ]
+        order = np.argsort(np.argsort(shard, kind="stable"), kind="stable")
+        return gather(parts, [0, *np.cumsum([len(own) for own in inside]).tolist()], order)
+
+    def set_rows(self, states: Sequence[State], bounds: Sequence[int], ids: Ints) -> None:
+        """Replace every environment k by environment `ids[k]` of states with rows.
+
+        Args:
+            states: states as `get_rows` returns them; the first contains all environments as they
+                are now.
+            bounds: first environments of the states, as in `batching.gather`.
+            ids: (B,) index of the environment that each one becomes.
+        """
+        for part, (first, end) in zip(self.parts, pairwise(self.bounds), strict=True):
+            own = ids[first:end]
+            if (own != np.arange(first, end)).any():
+                part.set_state({"settings": part.settings, **gather(states, bounds, own)})
+
+    def restart_streams(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
+        """Spawn the random streams of environments anew.
+
+        Args:
+            ids: (n,) sorted indices of the environments.
+            rngs: random generators of these n environments.
+        """
+        cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
+        for part, first, (low, high) in zip(self.parts, self.bounds[:-1], cuts, strict=True):
+            part.restart_streams(ids[low:high] - first, rngs[low:high])
 
     def close(self) -> None:
         """Stop the threads, and close the simulations."""
