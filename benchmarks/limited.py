@@ -36,7 +36,7 @@ from hrc_env.experiments.columns import (
     rate,
     share_above_force_limit,
 )
-from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Table
+from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Table, format_seeds
 from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
@@ -130,6 +130,7 @@ def make_study(trainings: Trainings, limit: float) -> Study:
             chosen_on=f"policies were trained on seeds {', '.join(map(str, seeds))}, with the body "
             f"`worker_1`; {SHIELD_CHOSEN_ON}",
             worker=WORKER,
+            seeds=format_seeds(range(EVALUATION_SEED, EVALUATION_SEED + 1000)),
         ),
         n_quick=2,
     )  # fmt: skip

@@ -371,7 +371,10 @@ def estimate_clustered_share(
     Its 95 % interval is the exact binomial one for the effective number of trials: that of
     independent trials whose fraction would vary as much as it does over seeds (Korn and Graubard
     1998, Survey Methodology 24:193-201). If no trial or every trial has the event, it is the number
-    of seeds. Otherwise, the interval is NaN for fewer than `MIN_SEEDS` seeds.
+    of seeds. Otherwise, the interval is NaN for fewer than `MIN_SEEDS` seeds. If most events occur
+    in very few seeds, the interval is still somewhat too narrow, though less so than a bootstrap:
+    it holds a share of 2 % in 20 seeds in 95 % of cases if seeds are similar, and in 83 % if most
+    have no event (bootstrap: 89 % and 73 %).
 
     Args:
         counts: number of trials with the event (n,) per seed, such as steps of an episode.

@@ -49,7 +49,8 @@ class Conditions:
     worker: str = "any"
     """Choice of the workers' bodies."""
     seeds: str = ""
-    """Seeds of the episodes from which the numbers were computed; a `Study` states its own."""
+    """Seeds of the episodes from which the numbers were computed; a `Study` with rows states its
+    own."""
 
     @property
     def words(self) -> str:
@@ -141,6 +142,19 @@ class Table:
         """Return the names of all metrics that the table can show."""
         names = {name for row in self.rows for c in self.columns for name in c.list_metrics(row)}
         return (names | {c.metric for c in self.numbers.values()}) - self.printed.keys()
+
+    def list_unmeasured(self, metrics: Metrics) -> list[Column]:
+        """Return the columns for which no row has a metric.
+
+        Args:
+            metrics: metrics by name.
+        """
+        known = {*metrics, *self.printed}
+        return [
+            column
+            for column in self.columns
+            if not any({*column.list_metrics(row)} <= known for row in self.rows)
+        ]
 
     def describe_intervals(self, metrics: Metrics) -> str:
         """Return sentences on missing intervals and on the dots of differences; "" if not needed.
@@ -410,9 +424,9 @@ def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: b
 def format_interval(value: float, low: float, high: float, digits: int, sign: str = "") -> str:
     """Return a value with the ends of its interval in brackets.
 
-    The interval is left out if its ends are NaN, or if all three numbers are equal at this number
-    of decimals. Numbers that would all be shown as zero have as many decimals as needed to tell the
-    greatest from zero.
+    The interval is left out if its ends are not finite, or if all three numbers are equal at this
+    number of decimals. Numbers that would all be shown as zero have as many decimals as needed to
+    tell the greatest from zero.
 
     Args:
         value: the value.
@@ -421,13 +435,13 @@ def format_interval(value: float, low: float, high: float, digits: int, sign: st
         digits: number of decimals.
         sign: "+" to show the sign of positive numbers, too.
     """
-    if math.isnan(low) or math.isnan(high):
-        return f"{value:{sign}z,.{digits}f}"
-    largest = max(abs(low), abs(high))
+    has_interval = math.isfinite(low) and math.isfinite(high)
+    largest = max(abs(low), abs(high)) if has_interval else abs(value)
     while 0 < largest < 0.5 * 10.0**-digits and digits < MAX_DIGITS:
         digits += 1
     texts = [f"{number:{sign}z,.{digits}f}" for number in (value, low, high)]
-    return texts[0] if len({*texts}) == 1 else f"{texts[0]} ({texts[1]} to {texts[2]})"
+    is_alone = not has_interval or len({*texts}) == 1
+    return texts[0] if is_alone else f"{texts[0]} ({texts[1]} to {texts[2]})"
 
 
 def _embed(out: Path, source: str) -> str:

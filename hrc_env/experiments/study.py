@@ -309,7 +309,9 @@ class Study:
             tables = (Table(self.name, self.title, rows, columns, self.heads, self.note),)
         if self.conditions is None:
             return tables
-        conditions = replace(self.conditions, seeds=format_seeds(self.seeds or [self.first_seed]))
+        conditions = self.conditions
+        if self.rows:
+            conditions = replace(conditions, seeds=format_seeds(self.seeds))
         return tuple(replace(table, conditions=conditions) for table in tables)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
