@@ -323,7 +323,7 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
         goals_per_minute=float(reached / minutes),
         contacts_per_episode=float(column["contacts"].mean()),
         contacts_per_hour=estimate_rate(
-            sum(column[f"contacts_{kind}"] for kind in KINDS), hours, "1/h"
+            np.sum([column[f"contacts_{kind}"] for kind in KINDS], axis=0), hours, "1/h"
         ),
         **{
             f"contacts_{kind}_per_hour": estimate_rate(column[f"contacts_{kind}"], hours, "1/h")
