@@ -25,6 +25,7 @@ from hrc_env.experiments.price.experiment import (
 )
 from hrc_env.experiments.price.metrics import (
     CONTRASTS,
+    N_DRAWS,
     Played,
     Row,
     compute_metrics,
@@ -325,6 +326,23 @@ def row(rng, goals: float) -> Row:
     names = ("standing", "away", "cost", "contacts_rated", "contacts_above_limit")
     nothing = dict.fromkeys(names, np.zeros(60))
     return Row(searches, found.fresh_margin_m, {**fresh, **nothing})
+
+
+def test_contrasts_have_p_values_that_are_adjusted_for_their_number():
+    """A setup that equals the reference but for luck differs from it in no mark."""
+    more = {"truth": 1.0, "particle": 0.6, "one_camera": 0.0}
+    rows = {name: row(np.random.default_rng(0), goals) for name, goals in more.items()}
+    rows["two_cameras"] = row(np.random.default_rng(1), 0.6)
+    alone = {"HRCReach-v0": rows["truth"].fresh}
+    found = compute_metrics(Played({"HRCReach-v0": rows}, alone, {}), 30.0)
+    names = ("truth", "one_camera", "two_cameras")
+    single, adjusted = (
+        np.array([found[f"{p}.worth.{name}"].value for name in names]) for p in ("p", "p_holm")
+    )
+    assert (single[:2] == 2 / (N_DRAWS + 1)).all()
+    assert single[2] > 0.05
+    np.testing.assert_allclose(adjusted[:2], 3 * single[:2])
+    assert found["p_holm.worth.truth"].n == 3
 
 
 def test_setups_are_compared_draw_by_draw():

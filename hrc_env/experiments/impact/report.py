@@ -6,6 +6,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.experiments.impact.declaration import (
     LATENESS,
     QUESTION,
@@ -78,8 +79,9 @@ def make_report(
     draw_tradeoff(figures / "tradeoff.png", metrics, policies, setups)
     caption = (
         "One point per setup, placed by its paired difference from the reference; bars are 95 % "
-        "intervals. Higher is more goals, further left is safer. Below: approaches instead of "
-        "cost, without setups that have no track."
+        f"intervals, and setups without bars have too few seeds (fewer than {MIN_SEEDS}). Higher "
+        "is more goals, further left is safer. Below: approaches instead of cost, without setups "
+        "that have no track."
     )
     parts = [format_picture(figures / "tradeoff.png", caption)]
     parts += [
