@@ -241,10 +241,11 @@ def adjust_metrics(metrics: Mapping[str, Metric]) -> Metrics:
     """
     names = [name for name in metrics if name.startswith(P)]
     adjusted = adjust_holm([metrics[name].value for name in names])
+    values = [p if np.isfinite(p) else np.nan for p in adjusted.tolist()]
     n = int(np.isfinite(adjusted).sum())
     return {
         HOLM + name.removeprefix(P): Metric(p, p, p, "p", n)
-        for name, p in zip(names, adjusted.tolist(), strict=True)
+        for name, p in zip(names, values, strict=True)
     }
 
 
