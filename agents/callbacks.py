@@ -1,12 +1,13 @@
 """Training callbacks: safety ramp, progress display, learning curves, checkpoints and Ctrl-C."""
 
 import json
+import math
 import signal
 import textwrap
 import threading
 import time
 from collections import deque
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple, Self
@@ -179,7 +180,8 @@ class TrainingLog:
         """
         n_steps, note = self.learner.num_timesteps, ""
         if self.recent:
-            score = asdict(summarize(list(self.recent)))
+            numbers = summarize(list(self.recent)).numbers()
+            score = {name: value for name, value in numbers.items() if not math.isnan(value)}
             wall_s = self.before_s + time.monotonic() - self.started_s
             self.curve.append({"steps": float(n_steps), "wall_s": wall_s, **weights, **score})
             for name, value in score.items():

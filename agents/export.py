@@ -14,7 +14,7 @@ from rich.console import Console
 from hrc_env import __version__
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.core.progress import progress_bar
-from hrc_env.core.results import write_whole
+from hrc_env.core.results import describe_metric, write_whole
 from hrc_env.env_words import read_word
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
 from hrc_env.observations import IMAGE
@@ -149,7 +149,5 @@ def _evaluate(
     metrics = measure(episodes)
     names = ("goals_per_minute", "cost_per_episode", "contacts_per_episode")
     for name in names:
-        metric = metrics[name]
-        text = f"  {name:24s}{metric.value:.2f} ({metric.low:.2f} to {metric.high:.2f})"
-        console.print(text, highlight=False)
+        console.print(f"  {name:24s}{describe_metric(metrics[name])}", highlight=False)
     return Worth(shield, request.episodes, EVALUATION_SEED, *(metrics[name] for name in names))

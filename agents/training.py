@@ -139,8 +139,10 @@ def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
     score = evaluate(
         partial(checkpoints.load, checkpoint), arguments.episodes, **arguments.keywords()
     )
-    for name, value in asdict(score).items():
-        console.print(f"  {name + SHARES.get(name, ''):28s} {value:.3f}", highlight=False)
+    for name, text in score.describe().items():
+        console.print(
+            f"  {name + SHARES.get(name, ''):28s} {text}", highlight=False, soft_wrap=True
+        )
     if warning := describe_contradiction(score):
         console.print(warning, highlight=False, soft_wrap=True)
     return score

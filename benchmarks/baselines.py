@@ -26,8 +26,8 @@ from hrc_env.cli.checks import check_at_least
 from hrc_env.cli.entry import show_errors
 from hrc_env.evaluation.episodes import EVALUATION_SEED
 from hrc_env.evaluation.sums import ACHIEVED
-from hrc_env.experiments.columns import mean, per_minute, rate
-from hrc_env.experiments.report import Table
+from hrc_env.experiments.columns import mean, per_minute, rate, share_above_force_limit
+from hrc_env.experiments.report import Conditions, Table, format_seeds
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
@@ -38,14 +38,17 @@ LEVELS = ("truth", "keypoints", "none", "pixels")
 """Perception levels of the evaluations."""
 NOTE = """\
 Means over {n[truth.random.return]} episodes of 10 s ({n[pixels.random.return]} at `pixels`). Cost \
-and contacts are per episode and computed from the truth; the return depends on the robot's \
+per episode and contacts per hour are computed from the truth; the return depends on the robot's \
 belief, so compare it within one perception level only. 95 % intervals are exact for contacts and \
 bootstraps over episodes otherwise. PPO: one trained policy per row."""
+PER_HOUR = 360
+"""Factor from contacts in an episode of 10 s to contacts per hour."""
 COLUMNS = (
     mean("r", "return", "return"),
     per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),
     mean("cost", "cost", "cost_per_episode", digits=2),
-    rate("contacts", "contacts", "contacts_per_episode", digits=2),
+    rate("contacts", "contacts [1/h]", "contacts_per_episode", digits=0, scale=PER_HOUR),
+    share_above_force_limit(),
 )
 
 
@@ -130,8 +133,13 @@ def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
         rows=rows,
         columns=COLUMNS,
         tables=(Table("baselines", "Baselines", shown, COLUMNS, ("perception", "agent"), NOTE),),
+        conditions=Conditions(
+            people="`attentive`", scene="`lab`", perception="in the rows", worker="worker_1",
+            chosen_on="policies were trained on seed 0",
+            seeds=format_seeds(range(EVALUATION_SEED, EVALUATION_SEED + 128)),
+        ),
         n_quick=8,
-    )
+    )  # fmt: skip
 
 
 def make_default(out: Path) -> Study:

@@ -35,7 +35,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.evaluation.counts import ERRORS_M, Bins
-from hrc_env.evaluation.intervals import estimate_binned_quantile, estimate_ratio
+from hrc_env.evaluation.intervals import estimate_binned_quantile, estimate_clustered_share
 from hrc_env.experiments.ablations.play import BODIES, Walks, make_walks
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
@@ -231,7 +231,7 @@ def measure_level(level: str, n_episodes: int, facing: Facing) -> dict[str, Metr
     walks = make_walks("lab", 1, seeds, round(facing.seconds / DT_S))
     seen = count_errors(level, "particle", ALL, walks, seeds)
     for yaw in YAWS:
-        missed = estimate_ratio(seen[f"missed.{yaw}"], seen[f"free.{yaw}"], "share")
+        missed = estimate_clustered_share(seen[f"missed.{yaw}"], seen[f"free.{yaw}"])
         metrics[f"missed.{level}.{yaw}"] = missed
         metrics |= _measure_quantiles(
             f"off_share.{level}.{yaw}", SHARES, seen[f"off_share.{yaw}"], "share"

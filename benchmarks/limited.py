@@ -28,8 +28,16 @@ from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
 from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT
-from hrc_env.experiments.columns import Column, mean, per_minute, rate
-from hrc_env.experiments.report import Metrics, Table
+from hrc_env.experiments.columns import (
+    Column,
+    interventions,
+    mean,
+    per_minute,
+    rate,
+    share_above_force_limit,
+)
+from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Table, format_seeds
+from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
 
@@ -105,7 +113,8 @@ def make_study(trainings: Trainings, limit: float) -> Study:
             name, cells = name_row(learner, seed), (words, str(seed))
             shown[name] = cells
             if policy.exists():
-                rows[name] = Row(cells, 1000, str(policy), env={"shield": shield})
+                env = {"shield": shield, "config": {"worker": WORKER}}
+                rows[name] = Row(cells, 1000, str(policy), env=env)
     return Study(
         name="limited",
         title=TITLE,
@@ -116,8 +125,15 @@ def make_study(trainings: Trainings, limit: float) -> Study:
         columns=MEASURED,
         tables=(Table("limited", TITLE, shown, COLUMNS, ("learner", "seed"), NOTE),),
         derive=partial(judge_limits, trainings=trainings, limit=limit),
+        conditions=Conditions(
+            people="`attentive`", scene="`lab`", perception="`keypoints`",
+            chosen_on=f"policies were trained on seeds {', '.join(map(str, seeds))}, with the body "
+            f"`worker_1`; {SHIELD_CHOSEN_ON}",
+            worker=WORKER,
+            seeds=format_seeds(range(EVALUATION_SEED, EVALUATION_SEED + 1000)),
+        ),
         n_quick=2,
-    )
+    )  # fmt: skip
 
 
 def name_row(learner: str, seed: int) -> str:
@@ -186,15 +202,21 @@ def main() -> int:
     return run_study(make_study(trainings, arguments.cost_limit), arguments)
 
 
+PER_HOUR = 0.36
+"""Factor from contacts in 1,000 episodes of 10 s to contacts per hour."""
 NOTE = (
-    "`HRCReach-v0` at `keypoints`; 1,000 episodes with the policy's mean actions, 95 % intervals, "
-    "exact for contacts. Cost in training: of exploring actions, over the last two windows of "
-    "1,000 episodes. Greatest deviation: of one of these windows from the limit."
+    "`HRCReach-v0`; 1,000 episodes with the policy's mean actions, 95 % intervals, exact for "
+    "contacts and those above the force limit of the touched body region. Interventions: times "
+    "that the shield becomes active, per hour. Cost in training: of exploring actions, over the "
+    "last two windows of 1,000 episodes (smallest to largest). Greatest deviation: of one of these "
+    "windows from the limit."
 )
 MEASURED = (
     per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),
     mean("cost", "cost", "cost_per_episode"),
-    rate("contacts_towards", "contacts towards [per 1,000]", "towards", "1000 episodes"),
+    rate("contacts_towards", "contacts towards [1/h]", "towards", "1000 episodes", scale=PER_HOUR),
+    share_above_force_limit(),
+    interventions(),
     mean("r", name="return"),
     rate("contacts", name="contacts_per_episode"),
 )

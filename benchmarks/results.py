@@ -146,11 +146,37 @@ def explain_stale(name: str) -> str:
         reasons.append("another command")
     else:
         reasons += list_changes(made.get("config", {}), read_settings(name))
+    if zeros := list_unbounded_zeros(made.get("metrics", {})):
+        reasons.append(f"zero without a bound: {zeros[0]} and {len(zeros) - 1} more")
     if spoiled := records.read(name).spoiled:
         first, words = next(iter(spoiled.items()))
         rest = f" (and {len(spoiled) - 1} more)" if len(spoiled) > 1 else ""
         reasons.append(f"replayed, part {first}{rest} differs: {words}")
     return ", ".join(reasons)
+
+
+COUNTED_IN = ("share", "1/min", "1/h", "per 1000", "per 1000 steps", "per 100 sequences",
+              "per 1000 episodes of 10 s")  # fmt: skip
+"""Units of rates and shares."""
+
+
+def list_unbounded_zeros(metrics: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return the names of rates and shares of zero with an interval of no width.
+
+    If nothing was observed, such a rate still has an upper bound. Paired differences of zero are
+    left out, as both rows can be the same.
+
+    Args:
+        metrics: metrics by name, as results.json contains them.
+    """
+    return [
+        name
+        for name, metric in metrics.items()
+        if metric["value"] == metric["low"] == metric["high"] == 0
+        and metric["n"] > 1
+        and metric["unit"] in COUNTED_IN
+        and not name.startswith(("difference.", "worth."))
+    ]
 
 
 def read_settings(name: str) -> dict[str, Any]:

@@ -2,8 +2,9 @@
 
     python -m benchmarks.shielded
 
-Goals, contacts and cost are measured for the scripted reaching agent, which ignores people, while
-people ignore the robot. The robot has no shield, or the shield `qp` with several perception setups.
+Goals, contacts by kind and severity, interventions and cost are measured for the scripted reaching
+agent, which ignores people, while people ignore the robot. The robot has no shield, or the shield
+`qp` with several perception setups.
 """
 
 import sys
@@ -11,11 +12,18 @@ from typing import Any
 
 from benchmarks.command import main
 from hrc_env.evaluation.sums import ACHIEVED
-from hrc_env.experiments.columns import Column, mean, per_minute, rate, share_of_baseline
+from hrc_env.experiments.columns import (
+    Column,
+    list_safety_columns,
+    mean,
+    per_minute,
+    share_of_baseline,
+)
+from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions
 from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import FOUR, Row, Study
 from hrc_env.perception.faults.fault import ALL, FaultConfig
-from hrc_env.safety.incidents import KINDS
 
 BLIND = (FaultConfig("lost", (ALL,), None, 3.0, 6.0),)
 """Fault in which all cameras fail from 3 s to 6 s."""
@@ -29,8 +37,8 @@ def _make_row(
     baseline: str = "bare",
     **env: Any,
 ) -> Row:
-    """Return a row of the study, with workers that ignore the robot."""
-    known = {"people": "unaware", "shield": shield, **env}
+    """Return a row of the study, with workers of all bodies that ignore the robot."""
+    known = {"people": "unaware", "config": {"worker": WORKER}, "shield": shield, **env}
     return Row(words, n_episodes, "scripted", setup, known, baseline, is_shown=words != "")
 
 
@@ -63,16 +71,20 @@ STUDY = Study(
     columns=(
         Column("{}.share", "episodes", 0, shows="n"),
         share_of_baseline(ACHIEVED, "throughput [%]", scale=100),
-        *(rate(f"contacts_{kind}", f"contacts {kind} [per 1,000]", kind, "1000 episodes")
-          for kind in ("towards", "standing", "fleeing")),
+        *list_safety_columns(),
         mean("cost", "cost"),
         per_minute(ACHIEVED, name="goals_per_minute"),
-        rate([f"contacts_{kind}" for kind in KINDS], name="all", per="1000 episodes"),
     ),
-    note="The agent `scripted` beside workers of one body who ignore it, with `shield=\"qp\"` "
-    "unless stated otherwise. Throughput: goals relative to an unshielded robot on the same seeds. "
-    "Contacts per 1,000 episodes of 10 s, by the motion of the robot; cost per episode. 95 % "
-    "intervals, exact for contacts.",
+    note="The agent `scripted` beside workers who ignore it, with `shield=\"qp\"` unless stated "
+    "otherwise. Throughput: goals relative to an unshielded robot on the same seeds. Contacts per "
+    "hour of simulated time, by the motion of the robot; above the force limit: share of all "
+    "contacts, by the estimated force and the limit of the touched body region; interventions: "
+    "times that the shield becomes active, per hour; cost per episode of 10 s. 95 % intervals, "
+    "exact for contacts.",
+    conditions=Conditions(
+        people="`unaware`", scene="`lab`", perception="`keypoints`, unless a row names another",
+        chosen_on=SHIELD_CHOSEN_ON, worker=WORKER,
+    ),
 )  # fmt: skip
 
 if __name__ == "__main__":

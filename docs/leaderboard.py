@@ -32,7 +32,7 @@ truth.
 
 The tables below show unaware people and four cameras. They are sorted by goals under the shield.
 All numbers have 95 % intervals. Those of contacts are exact: they are wide because contacts are
-rare. A cost of 0.0 without an interval was 0 in every episode. Entries are shown as they were
+rare. "0.0 in all 64" was 0 in every one of 64 episodes. Entries are shown as they were
 submitted, and are not played again. All numbers are in `docs/results/leaderboard/`.
 
 ## How to enter

@@ -8,12 +8,16 @@ text below one of the table's headings, and leave out intervals:
 sentence is between `<!-- number: NAME.WHICH -->` and `<!-- end -->`, the provenance of all tables
 of a page between `<!-- provenance -->` and `<!-- end of provenance -->`, and a file of `examples/`
 between `<!-- example: PATH -->` and `<!-- end of example -->`.
+
+The text of a table is that of today's study. If its numbers are older (`benchmarks.results`), a
+sentence below it says so, and columns that they lack are left out and named.
 """
 
 import json
+import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +25,9 @@ from typing import Any
 from benchmarks.studies import COMMANDS
 from hrc_env.core.results import Metric
 from hrc_env.core.versions import SUBSYSTEMS
+from hrc_env.evaluation.intervals import MIN_SEEDS, estimate_share_of
 from hrc_env.experiments.report import Metrics, Table, format_table
+from hrc_env.worker.body import ANY
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(
@@ -33,6 +39,9 @@ NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end 
 PROVENANCE = re.compile(r"<!-- provenance -->\n.*?<!-- end of provenance -->", re.S)
 EXAMPLE = re.compile(r"<!-- example: (?P<path>[\w/]+\.py) -->\n.*?<!-- end of example -->", re.S)
 EXAMPLES = Path(__file__).parent.parent / "examples"
+RANGES = ("cluster", "learners", "limited", "speed", "speed_organs", "speed_pixels", "speed_tasks",
+          "tracking_cost")  # fmt: skip
+"""Tables with the smallest and the largest of several runs instead of intervals."""
 GENERATED = (BLOCK, NUMBER, PROVENANCE, EXAMPLE)
 
 
@@ -47,6 +56,8 @@ class Result:
     """Of the package."""
     depends: Mapping[str, int]
     """Versions of the subsystems that the numbers depend on."""
+    bodies: str
+    """Body of the workers by the settings of that run; "any" for all."""
     date: str
     machine: str
 
@@ -83,6 +94,7 @@ def read(name: str) -> Result:
         command=whole["command"],
         version=whole["hrc_env"],
         depends=whole["depends"],
+        bodies=ANY if f'"worker": "{ANY}"' in json.dumps(whole.get("config")) else "worker_1",
         date=whole["date"],
         machine=f"{whole['machine']['cores']} cores, no GPU",
     )
@@ -103,8 +115,64 @@ def _block(found: re.Match[str]) -> str:
     table = result.table
     if found["head"]:
         table = table.select_rows(found["head"], found["cell"])
-    text = table.to_markdown(result.metrics, intervals=not found["plain"])
-    return f"{first}\n{text}\n<!-- end of results -->"
+    stale = describe_stale(found["name"], result)
+    if stale:
+        missing = table.list_unmeasured(result.metrics)
+        table = replace(table, columns=[each for each in table.columns if each not in missing])
+    metrics = result.metrics if found["name"] in RANGES else withhold_intervals(table, result)
+    text = table.to_markdown(metrics, intervals=not found["plain"])
+    return "\n\n".join(filter(None, (f"{first}\n{text}", stale))) + "\n<!-- end of results -->"
+
+
+def withhold_intervals(table: Table, result: Result) -> Metrics:
+    """Return metrics without the intervals of fewer than `MIN_SEEDS` seeds, unless they are exact.
+
+    Results of earlier versions have such intervals, which are bootstraps.
+
+    Args:
+        table: the table.
+        result: the table's numbers.
+    """
+    columns = [column for column in table.columns if column.counted]
+    counted = {name for row in table.rows for each in columns for name in each.list_metrics(row)}
+    return {
+        name: each if name in counted or each.n >= MIN_SEEDS or is_exact(each)
+        else replace(each, low=math.nan, high=math.nan)
+        for name, each in result.metrics.items()
+    }  # fmt: skip
+
+
+def is_exact(metric: Metric) -> bool:
+    """Return whether the interval of a metric cannot be a bootstrap.
+
+    This holds for a number without an interval, for a zero with one, and for the exact interval of
+    a fraction of `Metric.n` trials.
+    """
+    if metric.low == metric.high or metric.value == 0 or not 0 < metric.value <= 1:
+        return metric.low == metric.high or metric.value == 0
+    exact = estimate_share_of([round(metric.value * metric.n)], [metric.n])
+    return math.isclose(exact.low, metric.low, rel_tol=1e-4)
+
+
+def describe_stale(name: str, result: Result) -> str:
+    """Return what the text of a table does not say of its numbers if they are old; "" otherwise.
+
+    Args:
+        name: name of the table.
+        result: the table with its numbers.
+    """
+    from benchmarks.results import explain_stale  # here: it imports this module
+
+    command, _ = declared(name)
+    if not explain_stale(command):
+        return ""
+    words = ["Numbers of an earlier version (`python -m benchmarks.results --list`)."]
+    conditions, missing = result.table.conditions, result.table.list_unmeasured(result.metrics)
+    if conditions is not None and conditions.worker != result.bodies:
+        words.append(f"In them, all workers have the body `{result.bodies}`.")
+    if missing:
+        words.append(f"Not measured yet: {'; '.join(column.heading for column in missing)}.")
+    return f"*{' '.join(words)}*"
 
 
 def _number(found: re.Match[str]) -> str:

@@ -117,8 +117,13 @@ def test_a_table_is_declared_once():
 
 @pytest.mark.parametrize("name", tables.names())
 def test_a_table_finds_a_number_for_every_column(name):
+    """Of old numbers, columns that they lack are named below the table."""
     result = tables.read(name)
-    result.table.check(result.metrics)
+    missing = result.table.list_unmeasured(result.metrics)
+    stale = tables.describe_stale(name, result)
+    assert all(column.heading in stale for column in missing)
+    shown = [each for each in result.table.columns if each not in missing]
+    replace(result.table, columns=shown).check(result.metrics)
     unknown = {each.metric for each in result.table.numbers.values()} - result.metrics.keys()
     assert unknown == set()
     assert result.table.printed.keys().isdisjoint(result.metrics)
@@ -153,12 +158,16 @@ def test_counts_stand_with_their_intervals():
     known = set()
     for name in tables.names():
         result = tables.read(name)
+        missing = result.table.list_unmeasured(result.metrics)
         for column in result.table.columns:
             if "contact" in column.heading or "[in 1,000]" in column.heading:
                 assert column.counted, (name, column)
+                if column in missing:
+                    continue
                 one = replace(result.table, columns=[column], numbers={}, note="")
                 text = one.to_markdown(result.metrics, intervals=False)
-                cells = [line.split("|")[-2] for line in text.splitlines()[4:]]
+                lines = [line for line in text.splitlines() if line.startswith("| ")]
+                cells = [line.split("|")[-2] for line in lines[1:]]
                 assert cells, (name, column)
                 assert all(INTERVAL.search(each) for each in cells if each != " - "), (name, column)
                 known.add(name)
@@ -317,14 +326,14 @@ MEASURED_LOOKING = re.compile(
 )
 SETTINGS = {
     # Other people's packages; the rate of contacts that was asked for (PriceConfig.level).
-    "README.md": "1.1 GB, 2.0 GB, 5.8 GB, 30 times, 1,000 episodes",
+    "README.md": "1.1 GB, 2.0 GB, 5.8 GB, 10.8 times",
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
     "compare_estimator.md": "40 episodes, 95 %",
     "conventions.md": "0.04 s",
     "first_policy.md": "64 episodes, 95 %",
     "glossary.md": "0.05 m, 0.10 m, 0.15 m, 95 %",
     "start.md": "250 steps, 0.04 s",
-    "experiments.md": "72 degrees, 0.9 m, 5 %, 95 %, 25 images",
+    "experiments.md": "72 degrees, 0.9 m, 5 %, 25 images",
     "motion_capture.md": (
         "120 Hz, 1.3 to 2.2 m, 0.25 s, 5 to 1000 Hz, 0.5 s, 20 s, 1 to 4 degrees, 8 cm, 0.7 s, 6 cm"
     ),

@@ -27,7 +27,7 @@ def test_the_plain_ppo_runs_and_says_how_many_goals_it_reached():
 
 
 def test_the_first_policy_is_trained_compared_and_can_be_played(tmp_path):
-    words = ("--timesteps", "1024", "--num-envs", "16", "--episodes", "2", "--perception", "truth")
+    words = ("--timesteps", "1024", "--num-envs", "16", "--episodes", "8", "--perception", "truth")
     printed = run("first_policy.py", *words, "--out", str(tmp_path / "first"))
     interval = r"-?[\d.]+ \(-?[\d.]+ to -?[\d.]+\)"
     rows = re.findall(rf"^(\w[\w, ]+?) {{2,}}{interval} +{interval} +{interval}$", printed, re.M)
@@ -65,7 +65,7 @@ def test_fsrl_learns_with_our_cost_and_is_judged_as_ours_are():
 
 @pytest.mark.usefixtures("brought")  # so that the estimator is gone afterwards
 def test_an_estimator_is_compared_in_accuracy_and_in_safety(tmp_path):
-    words = ("--episodes", "3", "--safety-episodes", "2", "--out", str(tmp_path / "report"))
+    words = ("--episodes", "8", "--safety-episodes", "8", "--out", str(tmp_path / "report"))
     text = run("compare_estimator.py", *words)
     number = r"(-?[\d.]+) \(-?[\d.]+ to -?[\d.]+\)"
     scores = {name: [float(value) for value in values] for name, *values in re.findall(

@@ -93,8 +93,8 @@ def test_goals_that_are_no_numbers_reach_no_task(goal):
 
 def test_paired_gives_the_difference_of_a_statistic_of_one_row():
     ours, theirs = (
-        np.array([1.0, 2.0, 4.0, 8.0, 9.0, 3.0]),
-        np.array([0.5, 1.0, 3.0, 7.0, 8.0, 2.0]),
+        np.array([1.0, 2.0, 4.0, 8.0, 9.0, 3.0, 5.0, 6.0]),
+        np.array([0.5, 1.0, 3.0, 7.0, 8.0, 2.0, 6.0, 5.0]),
     )
     both = np.array([*ours, *theirs])
     found = hrc_env.compare_paired("mean", lambda w: w @ both / w.sum(-1), len(ours), "m")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hrc_env.evaluation.episodes import describe_contradiction, summarize
+from hrc_env.evaluation.sums import STATISTICS
 
 pytest.importorskip("torch")
 from matplotlib.figure import Figure
@@ -16,7 +17,7 @@ from hrc_env.agents.training import describe_weight
 
 
 def episode(reached: float, missed: float, success: float) -> dict[str, float]:
-    other = dict.fromkeys(("r", "cost", "cost_steps", "contacts", "min_separation_m"), 0.0)
+    other = dict.fromkeys(STATISTICS, 0.0)
     counts = {"goals_reached": reached, "goals_missed": missed, "success": success}
     return {**other, **counts, "seconds": 10.0}
 

@@ -17,6 +17,7 @@ from assets.emulator.watch import BodyOf, Watched, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.perception.sightlines import SEEN, SIDE
 from hrc_env.worker.body import load_body
 
@@ -152,12 +153,12 @@ def apart(family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]) -
 def over_clips(
     numbers: Callable[[Ints], list[float]], n_clips: int, units: Sequence[str], n: int
 ) -> list[Metric]:
-    """Return metrics of clips (K,) with 95 % intervals that resample the clips; `n` is that of
-    observations."""
-    draws = np.random.default_rng(0)
+    """Return metrics of clips (K,) with 95 % intervals that resample the clips, from 8 clips on;
+    `n` is that of observations."""
+    draws, values = np.random.default_rng(0), numbers(np.arange(n_clips))
     again = [numbers(draws.integers(0, n_clips, n_clips)) for _ in range(RESAMPLES)]
-    lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
-    values = numbers(np.arange(n_clips))
+    ends = np.percentile(again, [2.5, 97.5], axis=0)
+    lows, highs = (ends if n_clips >= MIN_SEEDS else np.full_like(ends, np.nan)).tolist()
     return [Metric(*each, n) for each in zip(values, lows, highs, units, strict=True)]
 
 

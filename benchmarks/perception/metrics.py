@@ -14,8 +14,8 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation.intervals import (
     bootstrap,
+    estimate_clustered_share,
     estimate_quantile,
-    estimate_ratio,
     estimate_rmse,
     estimate_share,
 )
@@ -94,11 +94,11 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
     return {
         f"error_m.{name}.median": estimate_quantile(errors, 0.5, "m"),
         f"error_m.{name}.p95": estimate_quantile(errors, 0.95, "m"),
-        f"coverage95.{name}": estimate_ratio(
-            inside, [float(len(each)) for each in errors], "share"
+        f"coverage95.{name}": estimate_clustered_share(
+            inside, [float(len(each)) for each in errors]
         ),
         f"std_over_error.{name}": estimate_rmse(reported, squared, "ratio"),
-        f"lost_steps.{name}": estimate_ratio(lost, steps, "share"),
+        f"lost_steps.{name}": estimate_clustered_share(lost, steps),
     }
 
 
@@ -146,7 +146,7 @@ def _rate_detections(episodes: list[Episode], cameras: list[int]) -> Metric:
     """Compute the fraction of steps in which the faulty camera detects the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
-    return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
+    return estimate_clustered_share(seen, [float(len(each.off_px)) for each in episodes])
 
 
 def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
@@ -161,7 +161,7 @@ def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metric
     return {
         f"{start}.named": estimate_share([bool(each.any()) for each in mine]),
         f"{start}.after_s": estimate_quantile([[each] for each in first], 0.5, "s"),
-        f"{start}.others": estimate_ratio([float(each.sum()) for each in wrong], steps, "share"),
+        f"{start}.others": estimate_clustered_share([float(each.sum()) for each in wrong], steps),
     }
 
 

@@ -13,7 +13,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
-from hrc_env.evaluation.intervals import estimate_quantile, estimate_ratio
+from hrc_env.evaluation.intervals import estimate_clustered_share, estimate_quantile
 from hrc_env.geometry.cameras import project
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
@@ -127,7 +127,7 @@ def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
     }
     inside = np.array_split(foretold.inside, n_blocks)
     counts = [np.isfinite(each).sum() for each in inside]
-    out["coverage95"] = estimate_ratio([np.nansum(each) for each in inside], counts, "share")
+    out["coverage95"] = estimate_clustered_share([np.nansum(each) for each in inside], counts)
     return out
 
 

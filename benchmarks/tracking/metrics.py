@@ -1,6 +1,7 @@
 """Computation of metrics from sums per sequence, with bootstrap intervals over sequences."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -9,6 +10,11 @@ from benchmarks.tracking.names import DEFAULT, EVERYTHING, Selection
 from benchmarks.tracking.sequences import MATCHED
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
+from hrc_env.evaluation.intervals import (
+    estimate_clustered_share,
+    estimate_rate,
+    make_percentile_metric,
+)
 
 TIMING = "timing"
 """Name that replaces the condition in those keys of `Parts` that hold times per update [us]."""
@@ -27,9 +33,14 @@ def compute_metrics(parts: Parts, selection: Selection = EVERYTHING) -> dict[str
             for name in selection.names_of(condition)
         }
         for name, sums in drawn.items():
+            sequences = parts[rig, condition, name][window]
             for kind, (unit, statistic) in STATISTICS.items():
                 if _NEEDS.get(kind, "n") in sums:
-                    metrics[f"{kind}.{rig}.{window}.{name}"] = metric(statistic(sums), unit, sums)
+                    metrics[f"{kind}.{rig}.{window}.{name}"] = (
+                        COUNTS[kind](sequences)
+                        if kind in COUNTS
+                        else metric(statistic(sums), unit, sums)
+                    )
         default = _rmse(drawn[DEFAULT])
         for name in selection.rivals():
             ratio = default / _rmse(drawn[name])
@@ -60,6 +71,14 @@ STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
 The metric "median_m" is the mean over the sequences of the median error in each. "facing_wrong" is
 the fraction of frames in which left and right of the torso are swapped.
 """
+COUNTS: dict[str, Callable[[Mapping[str, Any]], Metric]] = {
+    "facing_wrong": lambda each: estimate_clustered_share(each["wrong_way"], each["n_frames"]),
+    "coverage95": lambda each: estimate_clustered_share(each["inside"], each["n"]),
+    "identity_swaps": lambda each: estimate_rate(
+        each["identity_swaps"], len(each["n"]) / 100, STATISTICS["identity_swaps"][0]
+    ),
+}
+"""Functions that compute the metrics that are counts, with exact intervals, by name."""
 _NEEDS = {
     **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
     "identity_swaps": "identity_swaps",
@@ -83,9 +102,8 @@ def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
 
 def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
     """Return a metric with the first value, and the central 95 % interval of the others."""
-    low, high = np.percentile(values[1:], (2.5, 97.5))
-    n = factor * round(float(sums["one"][0]))
-    return Metric(float(values[0]), float(low), float(high), unit, n)
+    n = round(float(sums["one"][0]))
+    return replace(make_percentile_metric(float(values[0]), values[1:], unit, n), n=factor * n)
 
 
 def _times(parts: Parts) -> dict[str, Metric]:

@@ -74,8 +74,8 @@ class Evaluate(EnvironmentArguments, EngineArguments):
 
             score = evaluate(make, self.episodes, self.seed, engine=engine, tick=tick, **keywords)
         scores: dict[str, Any] = asdict(score)
-        for name, value in scores.items():
-            console.print(f"{name:28s} {value:.3f}", highlight=False)
+        for name, text in score.describe().items():
+            console.print(f"{name:28s} {text}", highlight=False, soft_wrap=True)
         if warning := describe_contradiction(score):
             console.print(warning, highlight=False, soft_wrap=True)
         if self.out is not None:

@@ -1,5 +1,6 @@
 """Play episodes with an agent: in the terminal, in a film or in a window."""
 
+import math
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -7,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import tyro
 from rich.console import Console
 from rich.table import Table
@@ -61,14 +63,22 @@ class Play(EnvironmentArguments):
             return 0
         import gymnasium
 
+        from hrc_env.core.results import describe_metric
+        from hrc_env.evaluation.episodes import summarize
+
         make_ready(Console(), self.perception)
         with closing(gymnasium.make(self.task, **arguments.keywords())) as env:
-            for episode in range(self.episodes):
-                self._play(env, self.seed + episode)
+            seeds = range(self.seed, self.seed + self.episodes)
+            episodes = [self._play(env, seed) for seed in seeds]
+        for name, metric in summarize(episodes).metrics().items():
+            Console().print(f"{name:28s} {describe_metric(metric)}", highlight=False)
         return 0
 
-    def _play(self, env: Any, seed: int) -> None:
+    def _play(self, env: Any, seed: int) -> dict[str, float]:
+        """Play an episode, print its score, and return its statistics (`EpisodeSums`)."""
         from hrc_env.evaluation import film
+        from hrc_env.evaluation.episodes import to_batch
+        from hrc_env.evaluation.sums import EpisodeSums
         from hrc_env.scene.viewer import Viewer
 
         inner = env.unwrapped
@@ -76,9 +86,10 @@ class Play(EnvironmentArguments):
         limit = env.spec.max_episode_steps
         make = make_agent_factory(self.agent, seed, self.trust)
         steps = film.begin_episode(env, make, seed, limit)
-        started_s, total, step, info = time.monotonic(), 0.0, 0, {}
+        started_s, total, step, info, sums = time.monotonic(), 0.0, 0, {}, EpisodeSums(1)
         for step, made in enumerate(track(steps, f"episode {seed}", limit), 1):
             total, info = total + float(made.reward), made.info
+            sums.add(np.array([made.reward]), to_batch(made))
             if window is not None:
                 window.show(*inner.views.pose())
                 due_s = started_s + step * inner.config.ctrl_dt
@@ -90,6 +101,7 @@ class Play(EnvironmentArguments):
         pace = step / (time.monotonic() - started_s)
         parts += [f"cost {info['episode_cost']:.0f}", f"{pace:.0f} steps/s"]
         Console().print(f"seed {seed}: {', '.join(parts)}")
+        return sums.summarize(0, info, inner.simulation.task, inner.config.ctrl_dt)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,5 +170,6 @@ def make_table(totals: dict[str, float], title: str = "") -> Table:
     rows.columns[1].justify = "right"
     for name, value in totals.items():
         quantity, _, unit = name.removesuffix("]").partition(" [")
-        rows.add_row(quantity, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
+        text = f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}"
+        rows.add_row(quantity, "-" if math.isnan(value) else text, unit)
     return rows

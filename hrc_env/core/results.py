@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import platform
 import subprocess
@@ -27,9 +28,9 @@ class Metric:
     value: float
     """Value of the metric: a mean, rate, fraction or median."""
     low: float
-    """Lower end of a 95 % interval, or the smallest of several runs."""
+    """Lower end of a 95 % interval, or the smallest of several runs; NaN without an interval."""
     high: float
-    """Upper end of a 95 % interval, or the largest of several runs."""
+    """Upper end of a 95 % interval, or the largest of several runs; NaN without an interval."""
     unit: str
     """Unit of the three numbers, such as "m" or "1/min"; "1" for none."""
     n: int
@@ -41,6 +42,15 @@ def over(values: Sequence[float], unit: str) -> Metric:
     return Metric(
         float(np.median(values)), float(np.min(values)), float(np.max(values)), unit, len(values)
     )
+
+
+def describe_metric(metric: Metric) -> str:
+    """Return a metric as text with its interval, unit and number of observations; "-" if NaN."""
+    if not math.isfinite(metric.value):
+        return f"- (n = {metric.n})"
+    ends = f" ({metric.low:.3f} to {metric.high:.3f})" if math.isfinite(metric.low) else ""
+    unit = "" if metric.unit in ("1", "share") else f" {metric.unit}"
+    return f"{metric.value:.3f}{ends}{unit}, n = {metric.n}"
 
 
 def provenance() -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -14,14 +14,29 @@ from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
 from hrc_env.core.brought import check_arguments, describe
 from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.machine import n_cores
-from hrc_env.core.results import Metric
+from hrc_env.core.results import Metric, describe_metric
 from hrc_env.engines.engine import Engine, Tick, engine_called
 from hrc_env.engines.files import carried
 from hrc_env.engines.local import Processes, Serial
 from hrc_env.env import HRCEnv
-from hrc_env.evaluation.intervals import estimate_goal_rate, estimate_mean, estimate_rate
+from hrc_env.evaluation.intervals import (
+    estimate_burst_rate,
+    estimate_goal_rate,
+    estimate_mean,
+    estimate_rate,
+    estimate_share_of,
+)
 from hrc_env.evaluation.rollout import Transition, rollout
-from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT, FAILED, EpisodeSums
+from hrc_env.evaluation.sums import (
+    ABOVE,
+    ACHIEVED,
+    COST_UNIT,
+    FAILED,
+    INTERVENTIONS,
+    RATED,
+    EpisodeSums,
+)
+from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks import DEFAULT
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
@@ -48,6 +63,22 @@ class Score:
     """Goals reached per minute over all episodes [1/min]."""
     contacts_per_episode: float
     """Mean number of contacts with a true worker; a lasting contact counts once."""
+    contacts_per_hour: Metric
+    """Contacts of all kinds that began per hour of simulated time, with the exact interval [1/h].
+    Touches within half a second of each other are one contact (`hrc_env.safety.incidents`)."""
+    contacts_towards_per_hour: Metric
+    """Contacts that began while the robot moved towards the worker [1/h]."""
+    contacts_fleeing_per_hour: Metric
+    """Contacts that began while the robot moved away from the worker [1/h]."""
+    contacts_standing_per_hour: Metric
+    """Contacts that began while the robot hardly moved [1/h]."""
+    contacts_above_limit: Metric
+    """Fraction of contacts with an estimated force above the limit of the touched body region
+    (`safety/contact_force_ratio` > 1), with the exact interval; `n` is the number of contacts.
+    Without a contact, the fraction is NaN."""
+    interventions_per_hour: Metric
+    """Number of times that the shield becomes active (`shield/active` rises from 0 to 1, or is 1 in
+    the first step) per hour of simulated time [1/h]; NaN without a shield."""
     cost_per_episode: float
     """Mean over episodes of the sum of `info["cost"]`, which is computed from the truth [control
     steps]."""
@@ -58,6 +89,25 @@ class Score:
     """Median over episodes of the smallest distance to a true worker [m]."""
     return_mean: float
     """Mean sum of rewards."""
+
+    def metrics(self) -> dict[str, Metric]:
+        """Return the rates of contacts and interventions and the share of severe contacts."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, Metric)}
+
+    def numbers(self) -> dict[str, float]:
+        """Return all numbers by name; of those with an interval, the value."""
+        metrics = self.metrics()
+        return {
+            field.name: metrics[field.name].value if field.name in metrics else number
+            for field in fields(self)
+            for number in (getattr(self, field.name),)
+        }
+
+    def describe(self) -> dict[str, str]:
+        """Return all numbers as text by name, with intervals and numbers of observations."""
+        texts = {name: f"{number:.3f}" for name, number in self.numbers().items()}
+        return texts | {name: describe_metric(each) for name, each in self.metrics().items()}
 
 
 def evaluate(
@@ -124,7 +174,9 @@ def evaluate_episodes(
         One dictionary per episode: the return `r`, the length `l` [control steps] and `seconds`
             [s]; `cost` and `cost_steps`, its part from steps near a worker [control steps];
             `contacts`, and of these `contacts_towards`, `contacts_fleeing` and `contacts_standing`;
-            `goals_reached` and `goals_missed`; `success`; and `min_separation_m` [m].
+            `contacts_rated`, those with an estimated force, and of these `contacts_above_limit`;
+            `interventions` of the shield, NaN without one; `goals_reached` and `goals_missed`;
+            `success`; and `min_separation_m` [m].
 
     Raises:
         ConfigError: the agent or the engine does not exist, or `n_episodes` is below 1.
@@ -236,7 +288,7 @@ def play_one_by_one(
         for k in range(n_episodes):
             sums, last = EpisodeSums(1), {}
             for step in rollout(env, agent, env.reset(seed=seed + k)[0]):
-                sums.add(np.array([step.reward]), _to_batch(step))
+                sums.add(np.array([step.reward]), to_batch(step))
                 last = step.info
             done.append(sums.summarize(0, last, inner.simulation.task, inner.config.ctrl_dt))
             tick(1 / n_episodes)
@@ -253,7 +305,7 @@ def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
     return agent
 
 
-def _to_batch(step: Transition) -> dict[str, Any]:
+def to_batch(step: Transition) -> dict[str, Any]:
     """Return the infos of a step of a single environment as those of a batch of size one."""
     arrays = {name: np.array([value]) for name, value in step.info.items()}
     return arrays | {f"_{name}": np.ones(1, np.bool_) for name in arrays}
@@ -263,13 +315,22 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
     """Return the score of finished episodes."""
     column = {name: np.array([row[name] for row in episodes]) for name in episodes[0]}
     reached, missed = column[ACHIEVED].sum(), column[FAILED].sum()
-    minutes = column["seconds"].sum() / 60
+    minutes, hours = column["seconds"].sum() / 60, column["seconds"] / 3600
     return Score(
         episodes=len(episodes),
         success_rate=float(reached / max(reached + missed, 1)),
         is_success=float(column["success"].mean()),
         goals_per_minute=float(reached / minutes),
         contacts_per_episode=float(column["contacts"].mean()),
+        contacts_per_hour=estimate_rate(
+            np.sum([column[f"contacts_{kind}"] for kind in KINDS], axis=0), hours, "1/h"
+        ),
+        **{
+            f"contacts_{kind}_per_hour": estimate_rate(column[f"contacts_{kind}"], hours, "1/h")
+            for kind in KINDS
+        },
+        contacts_above_limit=estimate_share_of(column[ABOVE], column[RATED]),
+        interventions_per_hour=estimate_burst_rate(column[INTERVENTIONS], hours, "1/h"),
         cost_per_episode=float(column["cost"].mean()),
         close_steps_per_episode=float(column["cost_steps"].mean()),
         median_min_separation_m=float(np.median(column["min_separation_m"])),

@@ -17,9 +17,12 @@ from hrc_env.agents.env_info import AgentFactory, env_info
 from hrc_env.core.progress import track
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.episodes import to_batch
 from hrc_env.evaluation.rollout import Transition, rollout
+from hrc_env.evaluation.sums import ABOVE, INTERVENTIONS, EpisodeSums
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.render.frame import MOMENT, Diary, compose
+from hrc_env.safety.incidents import KINDS
 
 STEPS_PER_FRAME = 2
 """Number of control steps per film frame; the film runs in real time."""
@@ -123,7 +126,7 @@ def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) 
 
     still: Future[Image] = Future()
     diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
-    step, counts = 0, {}
+    step, counts, info, sums = 0, {}, {}, EpisodeSums(1)
     with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread:
         for step, transition in enumerate(track(steps, "filming", n_steps)):
             info = transition.info
@@ -132,6 +135,7 @@ def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) 
             error_m = info["tracking/mpjpe_m"] if info["tracking/mpjpe_measured"] else np.nan
             diary[step] = true_m, believed.min(initial=np.inf), error_m, info["cost"]
             counts = env.simulation.task.counts(info)
+            sums.add(np.array([transition.reward]), to_batch(transition))
             if step % STEPS_PER_FRAME == 0:
                 glance = env.views.glance()
                 waiting.append(thread.submit(draw, diary[: step + 1], counts, glance))
@@ -143,16 +147,30 @@ def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) 
         for frame in waiting:
             frame.result()
         seconds = time.monotonic() - started_s
-    return FilmResult(_sum_up(diary[: step + 1], counts, seconds), still.result())
+    episode = sums.summarize(0, info, env.simulation.task, env.config.ctrl_dt)
+    return FilmResult(_sum_up(diary[: step + 1], counts, episode, seconds), still.result())
 
 
-def _sum_up(diary: Diary, counts: Mapping[str, float], seconds: float) -> dict[str, float]:
+def _sum_up(
+    diary: Diary, counts: Mapping[str, float], episode: Mapping[str, float], seconds: float
+) -> dict[str, float]:
+    """Return the totals of a film by name and unit.
+
+    Args:
+        diary: moments of the film.
+        counts: counts of the task.
+        episode: statistics of the episode (`EpisodeSums.summarize`).
+        seconds: time that the film took [s].
+    """
     errors_m = diary["error_m"][np.isfinite(diary["error_m"])]
     return {
         "median tracking error [mm]": 1e3 * float(np.median(errors_m)) if len(errors_m) else np.nan,
         "lost steps [%]": 100 * (1 - len(errors_m) / len(diary)),
         "minimum separation [m]": float(diary["true_m"].min()),
         **{f"{name} [count]": n for name, n in counts.items()},
+        **{f"contacts {kind} [count]": episode[f"contacts_{kind}"] for kind in KINDS},
+        "contacts above the force limit [count]": episode[ABOVE],
+        "interventions of the shield [count]": episode[INTERVENTIONS],
         "cost [control steps]": float(diary["cost"].sum()),
         "film drawn [frames/s]": len(diary) / STEPS_PER_FRAME / seconds,
     }

@@ -1,14 +1,16 @@
-"""Metrics with 95 % intervals, computed by bootstrap over seeds.
+"""Metrics with 95 % intervals: exact for counts and fractions, bootstraps over seeds for the rest.
 
 Seeds are resampled because the frames of one seed are dependent. Rows that share their seeds are
 compared seed by seed (`compare_paired`). Rates of rare events and fractions of trials have exact
-intervals (`estimate_rate`, `estimate_share`): if no event was observed, a bootstrap interval has
-zero width, as if the event were impossible.
+intervals (`estimate_rate`, `estimate_share`, `estimate_clustered_share`): if no event was observed,
+a bootstrap interval has zero width, as if the event were impossible. Fewer than `MIN_SEEDS` seeds
+have neither a bootstrap interval nor a p-value; both are then NaN.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,18 @@ from hrc_env.evaluation.counts import Bins
 
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats
+MIN_SEEDS = 8
+"""Smallest number of seeds with a bootstrap interval or a p-value. With fewer, percentile intervals
+are far too narrow."""
+N_FLIPS = (4_000, 40_000)
+"""Numbers of random swaps in a permutation test. The second is used if the first p-value is below
+`CLOSER_P`, as a p-value that is adjusted for many contrasts must be known more closely (sequential
+Monte Carlo test; Besag and Clifford 1991, doi:10.1093/biomet/78.2.301)."""
+CLOSER_P = 0.02
+P, HOLM = "p.", "p_holm."
+"""Prefixes of the names of p-values: of a single contrast, and adjusted for all of a study."""
+ALPHA = 0.05
+"""Adjusted p-value below which a difference is marked as significant."""
 Statistic = Callable[[Ints], Floats]
 """Function that computes a statistic for R bootstrap resamples of n seeds. It maps weights (R, n),
 the number of times that each seed occurs in each resample, to values (R,)."""
@@ -42,8 +56,8 @@ def compare_means(ours: Numbers, theirs: Numbers, unit: str = "1") -> Comparison
     """Return the difference of two means over the same seeds, compared pair by pair.
 
     The interval is computed by bootstrap over pairs. The p-value is that of a permutation test that
-    swaps the two numbers of a pair at random (Fisher 1935); it can fall below .05 with 6 pairs or
-    more. Pairs with a number that is not finite are ignored.
+    swaps the two numbers of a pair at random (Fisher 1935). Both are NaN for fewer than 8 pairs.
+    Pairs with a number that is not finite are ignored.
 
     Args:
         ours: numbers (n,), one per seed.
@@ -102,16 +116,29 @@ def compare_rates(
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
     """Return a statistic of n seeds with its 95 % percentile interval.
 
-    Resamples for which the statistic is undefined are ignored.
+    Resamples for which the statistic is undefined are ignored. The ends of the interval are NaN if
+    there are fewer than `MIN_SEEDS` seeds, or if the statistic of a resample is infinite.
     """
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         point = float(statistic(np.ones((1, n), np.int64))[0])
-        drawn = statistic(draw_seeds(n, n_draws)) if n > 1 else np.array([point])
+        drawn = statistic(draw_seeds(n, n_draws)) if n >= MIN_SEEDS else np.empty(0)
+    return make_percentile_metric(point, drawn, unit, n)
+
+
+def make_percentile_metric(point: float, drawn: Floats, unit: str, n: int) -> Metric:
+    """Return a statistic with the central 95 % interval of its values in resamples.
+
+    Args:
+        point: value of the statistic.
+        drawn: values (R,) in resamples of the seeds; NaN where the statistic is undefined.
+        unit: unit of the statistic.
+        n: number of seeds; if it is below `MIN_SEEDS`, the ends of the interval are NaN.
+    """
     drawn = drawn[~np.isnan(drawn)]
-    if np.isnan(point) or not np.isfinite(drawn).all() or not drawn.size:
-        return Metric(point, point, point, unit, n)
+    if n < MIN_SEEDS or np.isnan(point) or not drawn.size or not np.isfinite(drawn).all():
+        return Metric(point, np.nan, np.nan, unit, n)
     low, high = np.quantile(drawn, [0.025, 0.975])
     return Metric(point, float(low), float(high), unit, n)
 
@@ -139,18 +166,87 @@ def compare_paired(
     Returns:
         "difference.NAME", with its 95 % interval over resamples of whole pairs, and "p.NAME", the
             two-sided p-value of a permutation test that swaps the rows of each pair at random
-            (Fisher 1935), which can fall below .05 with 6 seeds or more.
+            (Fisher 1935). With fewer than `MIN_SEEDS` seeds, the interval and the p-value are NaN.
     """
 
     def subtract(ours: Ints, theirs: Ints) -> Floats:
         return statistic(np.hstack([ours, theirs])) - statistic(np.hstack([theirs, ours]))
 
     difference = bootstrap(lambda weights: subtract(weights, 0 * weights), n, unit, n_draws)
-    flips = np.random.default_rng(0).integers(0, 2, (n_draws, n))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        is_less = np.abs(subtract(flips, 1 - flips)) < abs(difference.value) * (1 - 1e-9)
-    p = (1 + int((~is_less).sum())) / (1 + n_draws) + 0 * difference.value  # NaN if that is NaN
-    return {f"difference.{name}": difference, f"p.{name}": Metric(p, p, p, "p", n)}
+    p = np.nan
+    if n >= MIN_SEEDS and np.isfinite(difference.value):
+        p = _test_by_permutation(subtract, n, abs(difference.value) * (1 - 1e-9))
+    return {f"difference.{name}": difference, f"{P}{name}": Metric(p, p, p, "p", n)}
+
+
+def _test_by_permutation(subtract: Callable[[Ints, Ints], Floats], n: int, least: float) -> float:
+    """Return the p-value of a paired difference.
+
+    It is exact if all swaps can be enumerated.
+
+    Args:
+        subtract: function that returns the differences (R,) for weights (R, n) of both rows.
+        n: number of pairs.
+        least: size from which a difference counts as at least as large as the observed one.
+    """
+    p, is_exact = 1.0, 2**n <= N_FLIPS[0]
+    for n_flips in N_FLIPS[:1] if is_exact else N_FLIPS:
+        n_as_large = n_drawn = 0
+        for flips in _list_swaps(n) if is_exact else _draw_swaps(n, n_flips):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                is_less = np.abs(subtract(flips, 1 - flips)) < least
+            n_as_large, n_drawn = n_as_large + int((~is_less).sum()), n_drawn + len(flips)
+        p = n_as_large / n_drawn if is_exact else (1 + n_as_large) / (1 + n_drawn)
+        if p > CLOSER_P:
+            break
+    return p
+
+
+def _list_swaps(n: int) -> Iterator[Ints]:
+    """Yield all ways (2^n, n) to swap n pairs."""
+    yield np.array(list(product((0, 1), repeat=n)))
+
+
+def _draw_swaps(n: int, n_flips: int) -> Iterator[Ints]:
+    """Yield random ways (R, n) to swap n pairs, in blocks; they are the same in every call."""
+    rng = np.random.default_rng(0)
+    for _ in range(n_flips // N_FLIPS[0]):
+        yield rng.integers(0, 2, (N_FLIPS[0], n))
+
+
+def adjust_holm(p_values: Numbers) -> Floats:
+    """Return p-values (n,) adjusted for n contrasts (Holm 1979, Scand. J. Statist. 6:65-70).
+
+    The probability that any contrast without a difference has an adjusted p-value below .05 is at
+    most .05. NaN values stay NaN and do not count as contrasts.
+
+    Args:
+        p_values: p-values (n,) of all contrasts that are tested together.
+
+    Raises:
+        ConfigError: p-values are not a one-dimensional array of numbers.
+    """
+    p = _check_column("p_values", p_values)
+    order = np.argsort(p)[: int(np.isfinite(p).sum())]
+    adjusted = np.full(len(p), np.nan)
+    factors = np.arange(len(order), 0, -1)
+    adjusted[order] = np.minimum(np.maximum.accumulate(p[order] * factors), 1.0)
+    return adjusted
+
+
+def adjust_metrics(metrics: Mapping[str, Metric]) -> Metrics:
+    """Return "p_holm.NAME" for each "p.NAME" of a study, adjusted for all its contrasts.
+
+    `Metric.n` is the number of contrasts.
+    """
+    names = [name for name in metrics if name.startswith(P)]
+    adjusted = adjust_holm([metrics[name].value for name in names])
+    values = [p if np.isfinite(p) else np.nan for p in adjusted.tolist()]
+    n = int(np.isfinite(adjusted).sum())
+    return {
+        HOLM + name.removeprefix(P): Metric(p, p, p, "p", n)
+        for name, p in zip(names, values, strict=True)
+    }
 
 
 def make_ratio(above: Numbers, below: Numbers) -> Statistic:
@@ -246,34 +342,141 @@ def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
     column = _check_column("outcomes", outcomes)
     if not np.isin(column, (0.0, 1.0)).all():
         raise ConfigError(f"outcomes must be true or false per trial, got {describe(outcomes)}.")
-    n, n_true = len(column), int(column.sum())
+    return estimate_share_of(column, np.ones(len(column)))
+
+
+def estimate_share_of(counts: Numbers, trials: Numbers) -> Metric:
+    """Return the fraction of independent trials with an event, with its exact 95 % interval.
+
+    It is the interval of `estimate_share`, for trials that were counted per seed.
+
+    Args:
+        counts: number of trials with the event (n,) per seed.
+        trials: number of all trials (n,) per seed.
+
+    Returns:
+        The fraction; `Metric.n` is the number of trials. Without trials, the fraction is NaN.
+    """
+    n_true, n = round(float(np.sum(counts))), round(float(np.sum(trials)))
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
     interval = stats.binomtest(n_true, n).proportion_ci(0.95, method="exact")
     return Metric(n_true / n, float(interval.low), float(interval.high), "share", n)
 
 
-def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
+def estimate_clustered_share(
+    counts: Numbers, trials: Numbers, unit: str = "share", per: float = 1.0
+) -> Metric:
+    """Return the fraction of trials with an event if trials with the same seed are dependent.
+
+    Its 95 % interval is the exact binomial one for the effective number of trials: that of
+    independent trials whose fraction would vary as much as it does over seeds (Korn and Graubard
+    1998, Survey Methodology 24:193-201). If no trial or every trial has the event, it is the number
+    of seeds. Otherwise, the interval is NaN for fewer than `MIN_SEEDS` seeds. If most events occur
+    in very few seeds, the interval is still somewhat too narrow, though less so than a bootstrap:
+    it holds a share of 2 % in 20 seeds in 95 % of cases if seeds are similar, and in 83 % if most
+    have no event (bootstrap: 89 % and 73 %).
+
+    Args:
+        counts: number of trials with the event (n,) per seed, such as steps of an episode.
+        trials: number of all trials (n,) per seed; seeds without trials are ignored.
+        unit: unit of the fraction.
+        per: number of trials to which the fraction refers.
+
+    Raises:
+        ConfigError: an event was counted in more than all trials, or in less than none.
+    """
+    x, y = _keep_finite(counts, trials)
+    if not ((x >= 0).all() and (x <= y).all()):
+        raise ConfigError(
+            f"counts must be between 0 and the number of trials, got {describe(counts)} of "
+            f"{describe(trials)}."
+        )
+    x, y = x[y > 0], y[y > 0]
+    n, n_trials = len(x), float(y.sum())
+    if not n:
+        return Metric(np.nan, np.nan, np.nan, unit, 0)
+    share = float(x.sum()) / n_trials
+    if n < MIN_SEEDS and 0 < share < 1:
+        return Metric(per * share, np.nan, np.nan, unit, n)
+    n_effective = float(n) if share in (0.0, 1.0) else _count_effective_trials(x, y)
+    n_true = share * n_effective
+    low = stats.beta.ppf(0.025, n_true, n_effective - n_true + 1) if share > 0 else 0.0
+    high = stats.beta.ppf(0.975, n_true + 1, n_effective - n_true) if share < 1 else 1.0
+    return Metric(per * share, per * float(low), per * float(high), unit, n)
+
+
+def _count_effective_trials(x: Floats, y: Floats) -> float:
+    """Return the number of independent trials with the same variance as x (n,) of y (n,) trials."""
+    n, n_trials = len(x), float(y.sum())
+    share = float(x.sum()) / n_trials
+    variance = n / (n - 1) * float(np.square(x - share * y).sum()) / n_trials**2
+    if variance == 0:
+        return n_trials
+    fewer = stats.t.ppf(0.975, max(n_trials - 1, n - 1)) / stats.t.ppf(0.975, n - 1)
+    return min(share * (1 - share) / variance * float(fewer) ** 2, n_trials)
+
+
+def estimate_goal_rate(goals: Numbers, minutes: Numbers, unit: str = "1/min") -> Metric:
     """Return goals per minute with an interval.
 
-    The interval is computed by bootstrap if any goal was reached, and is otherwise exact. Goals are
-    reached more regularly than the events of a Poisson process; the bootstrap interval is therefore
-    narrower than the exact one.
+    Goals are reached more regularly than the events of a Poisson process; the interval is therefore
+    computed by bootstrap. If no goal was reached, or all seeds have the same rate, a bootstrap
+    interval has zero width, and the interval is that of `estimate_rate`.
     """
-    return (estimate_ratio if np.any(goals) else estimate_rate)(goals, minutes, "1/min")
+    x, y = _keep_finite(goals, minutes)
+    is_regular = len(x) >= MIN_SEEDS and np.allclose(x * y.sum(), y * x.sum())
+    if is_regular or not x.any():
+        return estimate_rate(x, y, unit)
+    return bootstrap(make_ratio(x, y), len(x), unit)
 
 
-def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
-    """Return the fraction of attempts that succeeded, with a bootstrap interval.
+def estimate_burst_rate(counts: Numbers, exposure: Numbers, unit: str = "1") -> Metric:
+    """Return the rate of events that may come in bursts, such as interventions of a shield.
 
-    If all or none succeeded, the interval is the exact one for as many trials as there are seeds,
-    because attempts with the same seed are dependent.
+    The interval contains the exact one of a Poisson count and, from `MIN_SEEDS` seeds on, the
+    bootstrap interval over seeds, which is wider if events come in bursts.
+
+    Args:
+        counts: number of events (n,) per seed; seeds with NaN are ignored, and without other seeds
+            the rate is NaN.
+        exposure: the time observed (n,) per seed.
+        unit: unit of the rate.
     """
-    share = estimate_ratio(achieved, tries, "1")
-    if share.value not in (0.0, 1.0):
-        return share
-    exact = estimate_share([bool(share.value)] * share.n)
-    return replace(share, low=exact.low, high=exact.high)
+    x, y = _keep_finite(counts, exposure)
+    exact, drawn = estimate_rate(x, y, unit), bootstrap(make_ratio(x, y), len(x), unit)
+    if np.isnan(exact.value) or np.isnan(drawn.low):
+        return exact
+    return replace(exact, low=min(exact.low, drawn.low), high=max(exact.high, drawn.high))
+
+
+def estimate_rate_ratio(
+    ours: Numbers, theirs: Numbers, our_exposure: Numbers | float, their_exposure: Numbers | float
+) -> Metric:
+    """Return the ratio of two rates of rare events, with its exact 95 % interval.
+
+    Given the number of all events, those of our row are binomial (Przyborowski and Wilenski 1940,
+    doi:10.1093/biomet/31.3-4.313). The ratio is NaN if there is no event to compare with; the
+    interval is NaN if there is no event at all.
+
+    Args:
+        ours: number of events (n,) per seed.
+        theirs: number of events (m,) per seed to compare with.
+        our_exposure: exposure of `ours`, per seed or in total.
+        their_exposure: exposure of `theirs`, per seed or in total.
+    """
+    rates = estimate_rate(ours, our_exposure), estimate_rate(theirs, their_exposure)
+    x, y = int(np.sum(ours)), int(np.sum(theirs))
+    over, under = float(np.sum(our_exposure)), float(np.sum(their_exposure))
+    if not (x + y and over and under):
+        return Metric(np.nan, np.nan, np.nan, "share", rates[0].n)
+    interval = stats.binomtest(x, x + y).proportion_ci(0.95, method="exact")
+    low, high = (
+        under / over * share / (1 - share) if share < 1 else np.inf
+        for share in (float(interval.low), float(interval.high))
+    )
+    value = rates[0].value / rates[1].value if y else np.nan
+    return Metric(value, low, high, "share", rates[0].n)
 
 
 def subtract_rates(ours: Metric, theirs: Metric) -> Metric:

@@ -1,19 +1,30 @@
 """Sums of an episode's infos, updated step by step, and the statistics computed from them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from hrc_env.core.infos import Info
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks.task import Task
 
 COSTS = ("cost", "cost_proximity", "cost_contact")
 """Infos that are summed over an episode."""
-SUMS = np.dtype(
-    [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
-)
+SEVERITY, FORCE, ACTIVE = (
+    "safety/contact_severity", "safety/contact_force_ratio", "shield/active",
+)  # fmt: skip
+"""Infos from which severe contacts and interventions are counted; the severity is 0 if no contact
+begins in the step."""
+RATED, ABOVE, INTERVENTIONS = "contacts_rated", "contacts_above_limit", "interventions"
+"""Names of the statistics that count contacts with an estimated force, those of them with a force
+above the limit of the touched region, and interventions of the shield."""
+SUMS = np.dtype([
+    (name, "f8")
+    for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m", RATED, ABOVE,
+                 INTERVENTIONS, "active")
+])  # fmt: skip
 """Data type of the sums over the current episode. A lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """Names of the statistics that count an episode's achieved and failed attempts (`Task.achieved`,
@@ -21,9 +32,12 @@ ACHIEVED, FAILED = "goals_reached", "goals_missed"
 
 STATISTICS = (
     "r", "l", "seconds", "cost", "cost_steps", "contacts",
-    *(f"contacts_{kind}" for kind in KINDS), ACHIEVED, FAILED, "success", "min_separation_m",
+    *(f"contacts_{kind}" for kind in KINDS), RATED, ABOVE, INTERVENTIONS, ACHIEVED, FAILED,
+    "success", "min_separation_m",
 )  # fmt: skip
 """Names of the statistics of an episode (`EpisodeSums.summarize`)."""
+RARE = tuple(name for name in STATISTICS if name.startswith("contacts"))
+"""Statistics that count rare events, the rates of which have exact intervals."""
 COST_UNIT = "control steps"
 """Unit of costs."""
 UNITS = {
@@ -61,6 +75,12 @@ class EpisodeSums:
         touching = costs["cost_contact"] > 0
         sums["contacts"] += touching > sums["touching"]
         sums["touching"] = touching
+        sums[RATED] += read_step_value(infos, SEVERITY, len(sums)) > 0
+        sums[ABOVE] += read_step_value(infos, FORCE, len(sums)) > 1.0
+        active = read_step_value(infos, ACTIVE, len(sums))
+        begins = np.where(np.isnan(active), np.nan, active > sums["active"])
+        sums[INTERVENTIONS] += begins
+        sums["active"] = active
         separation_m = read_step_value(infos, "safety/min_separation_m", len(sums))
         sums["nearest_m"] = np.fmin(sums["nearest_m"], separation_m)
         return costs["cost"]
@@ -70,6 +90,11 @@ class EpisodeSums:
     ) -> dict[str, float]:
         """Return the statistics of the current episode of environment `b` by name.
 
+        An intervention begins when the shield becomes active: `shield/active` is 1, and was 0 in
+        the step before or the episode begins. Without a shield, the number of interventions is NaN.
+        Contacts with several workers that begin in the same step count as one rated contact, with
+        the largest force.
+
         Args:
             b: index of the environment.
             info: the last info of the episode.
@@ -77,6 +102,7 @@ class EpisodeSums:
             ctrl_dt_s: duration of a control step [s].
         """
         episode = self.sums[b]
+        is_shielded = np.isfinite(episode[INTERVENTIONS])
         return {
             "r": float(episode["reward"]),
             "l": int(episode["steps"]),
@@ -85,11 +111,36 @@ class EpisodeSums:
             "cost_steps": float(episode["cost_proximity"]),
             "contacts": float(episode["contacts"]),
             **{f"contacts_{kind}": info[f"safety/contacts_{kind}"] for kind in KINDS},
+            RATED: float(episode[RATED]),
+            ABOVE: float(episode[ABOVE]),
+            INTERVENTIONS: float(episode[INTERVENTIONS]) if is_shielded else np.nan,
             ACHIEVED: info[task.achieved],
             FAILED: info[task.failed],
             "success": float(info["is_success"]),
             "min_separation_m": float(episode["nearest_m"]),
         }
+
+
+def count_severe(infos: Sequence[Info]) -> dict[str, Ints]:
+    """Return the numbers (B,) of contacts with an estimated force, and of those above the limit.
+
+    Args:
+        infos: infos of all steps of B episodes.
+    """
+    severity, ratio = (np.stack([info[name] for info in infos]) for name in (SEVERITY, FORCE))
+    return {RATED: (severity > 0).sum(0), ABOVE: (ratio > 1.0).sum(0)}
+
+
+def count_interventions(infos: Sequence[Info]) -> dict[str, Ints]:
+    """Return the numbers (B,) of interventions of the shield; an empty dictionary without one.
+
+    Args:
+        infos: infos of all steps of B episodes.
+    """
+    if ACTIVE not in infos[0]:
+        return {}
+    active = np.stack([info[ACTIVE] for info in infos]).astype(float)
+    return {INTERVENTIONS: (np.diff(active, axis=0, prepend=0.0) > 0).sum(0)}
 
 
 def read_step_value(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:

@@ -2,11 +2,13 @@
 
 For example, `mean("cost", "cost")` is the mean cost of a row's episodes. Its heading is "cost", and
 its name in results.json is `ROW.cost`. All intervals are 95 % intervals
-(`hrc_env.evaluation.intervals`).
+(`hrc_env.evaluation.intervals`). Statistics that count rare events (`RARE`) have exact intervals in
+every kind of column, never bootstraps.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
@@ -15,7 +17,17 @@ from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation import intervals
-from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS, UNITS
+from hrc_env.evaluation.sums import (
+    ABOVE,
+    ACHIEVED,
+    FAILED,
+    INTERVENTIONS,
+    RARE,
+    RATED,
+    STATISTICS,
+    UNITS,
+)
+from hrc_env.safety.incidents import KINDS
 
 Episodes = Sequence[Mapping[str, float]]
 """Statistics of episodes (`hrc_env.evaluation.sums`), in the order of their seeds."""
@@ -42,19 +54,23 @@ class Column:
     signed: bool = False
     """Whether the metric is a difference, which is always shown with a sign."""
     marked: bool = True
-    """Whether a difference is marked with a dot if its interval excludes zero."""
+    """Whether a difference is marked with a dot if its p-value, adjusted for all contrasts of the
+    study, is below .05 (`hrc_env.evaluation.intervals.adjust_holm`)."""
     counted: bool = False
     """Whether the metric counts rare events. The interval of such a metric is always shown."""
     plain: bool = False
     """Whether the interval is never shown."""
-    shows: Literal["value", "n", "count"] = "value"
-    """Number to show: the value, the number of observations, or a fraction in the form "8 of 9"."""
+    shows: Literal["value", "n", "count", "value of n"] = "value"
+    """Number to show: the value, the number of observations, a fraction in the form "8 of 9", or
+    the value with its interval and the number of observations, "2.4 (0.1 to 12.9) of 41"."""
     beside: str = ""
     """Name of another metric, the value of which is shown in brackets instead of an interval."""
     measure: Measure | None = None
     """Function that computes the metric; None: the study or another column computes it."""
     is_paired: bool = False
     """Whether `measure` compares the row with its baseline."""
+    test: Measure | None = None
+    """Function that computes the p-value of a difference; None: there is no test."""
 
     def list_metrics(self, row: Key) -> list[str]:
         """Return the names of a row's metrics: that of the column and, if any, `beside`.
@@ -93,12 +109,14 @@ def mean(
     """
     check_names("statistic", [statistic], STATISTICS)
     metric_unit = UNITS.get(statistic, "1") if unit is None else unit
-    return _make_column(
-        name or statistic,
-        heading,
-        lambda own, _: intervals.estimate_mean(_get_values(own, statistic), metric_unit),
-        **shown,
-    )
+
+    def measure(own: Episodes, _: Episodes) -> Metric:
+        values, ones = _get_values(own, statistic), np.ones(len(own))
+        if statistic == "success":
+            return replace(intervals.estimate_share_of(values, ones), unit=metric_unit)
+        return _estimate(statistic, values, ones, metric_unit)
+
+    return _make_column(name or statistic, heading, measure, **shown)
 
 
 def per_minute(
@@ -111,22 +129,18 @@ def per_minute(
     """Return a column with the sum of a statistic over episodes, per minute of their duration.
 
     Args:
-        statistic: one of `STATISTICS`. For the achievements of a task
-            (`hrc_env.evaluation.sums.ACHIEVED`), the interval of a rate of zero is exact.
+        statistic: one of `STATISTICS`.
         heading: heading of the column; "" hides the column in tables.
         name: name of the metric (default: `STATISTIC_per_minute`).
         unit: unit of the metric (default: that of the statistic, per minute).
         shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
-    over = intervals.estimate_goal_rate if statistic == ACHIEVED else None
     counted_in = f"{UNITS.get(statistic, '1')}/min" if unit is None else unit
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        values, minutes = _get_values(own, statistic), _get_values(own, "seconds") / 60
-        return (
-            over(values, minutes) if over else intervals.estimate_ratio(values, minutes, counted_in)
-        )
+        minutes = _get_values(own, "seconds") / 60
+        return _estimate(statistic, _get_values(own, statistic), minutes, counted_in)
 
     return _make_column(name or f"{statistic}_per_minute", heading, measure, **shown)
 
@@ -187,7 +201,8 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        return intervals.estimate_share([bool(each[statistic]) for each in own])
+        known = [each[statistic] for each in own if not math.isnan(each[statistic])]
+        return intervals.estimate_share([bool(value) for value in known])
 
     return _make_column(statistic, heading, measure, **shown)
 
@@ -205,8 +220,8 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
     def measure(own: Episodes, _: Episodes) -> Metric:
         achieved, failed = _get_values(own, ACHIEVED), _get_values(own, FAILED)
         if clustered:
-            return intervals.estimate_success(achieved, achieved + failed)
-        return intervals.estimate_share([True] * int(achieved.sum()) + [False] * int(failed.sum()))
+            return intervals.estimate_clustered_share(achieved, achieved + failed, "1")
+        return intervals.estimate_share_of(achieved, achieved + failed)
 
     return _make_column("success", heading, measure, **shown)
 
@@ -225,9 +240,10 @@ def share_of_baseline(
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, theirs: Episodes) -> Metric:
-        return intervals.estimate_ratio(
-            _get_values(own, statistic), _get_values(theirs, statistic), "share"
-        )
+        ours, others = _get_values(own, statistic), _get_values(theirs, statistic)
+        if statistic in RARE:
+            return intervals.estimate_rate_ratio(ours, others, len(own), len(theirs))
+        return intervals.estimate_ratio(ours, others, "share")
 
     return _make_column(name, heading, measure, is_paired=True, **shown)
 
@@ -246,13 +262,93 @@ def difference_from_baseline(
     """
     check_names("statistic", [statistic], STATISTICS)
 
-    def measure(own: Episodes, theirs: Episodes) -> Metric:
-        both = [*_get_values(own, statistic), *_get_values(theirs, statistic)]
-        ratio = intervals.make_ratio(both, np.ones(len(both)))
-        return intervals.compare_paired("it", ratio, len(own), unit)["difference.it"]
+    def compare(own: Episodes, theirs: Episodes) -> intervals.Comparison:
+        ours, others = _get_values(own, statistic), _get_values(theirs, statistic)
+        if statistic in RARE:
+            return intervals.compare_rates(ours, others, len(own), len(theirs), unit)
+        return intervals.compare_means(ours, others, unit)
 
-    name = name or f"difference.{statistic}"
-    return _make_column(name, heading, measure, is_paired=True, signed=True, **shown)
+    def test(own: Episodes, theirs: Episodes) -> Metric:
+        p = compare(own, theirs).p
+        return Metric(p, p, p, "p", len(own))
+
+    column = _make_column(
+        name or f"difference.{statistic}",
+        heading,
+        lambda own, theirs: compare(own, theirs).difference,
+        is_paired=True,
+        **shown,
+    )
+    return replace(column, signed=True, test=test)
+
+
+def share_above_force_limit(
+    heading: str = "contacts above the force limit [%]", **shown: Unpack[Shown]
+) -> Column:
+    """Return the column "above_force_limit", the fraction of severe contacts.
+
+    These are contacts with an estimated force above the limit of the touched body region
+    (`safety/contact_force_ratio` > 1). The interval is exact, and the number of contacts is shown
+    beside it; without contacts, there is no fraction.
+
+    Args:
+        heading: heading of the column; "" hides the column in tables.
+        shown: fields of `Column`.
+    """
+
+    def measure(own: Episodes, _: Episodes) -> Metric:
+        return intervals.estimate_share_of(_get_values(own, ABOVE), _get_values(own, RATED))
+
+    column = _make_column(
+        "above_force_limit", heading, measure, **{"scale": 100, "counted": True, **shown}
+    )
+    return replace(column, shows="value of n")
+
+
+def interventions(heading: str = "interventions [1/h]", **shown: Unpack[Shown]) -> Column:
+    """Return the column "interventions_per_hour", the rate at which the shield becomes active.
+
+    An intervention begins when `shield/active` rises from 0 to 1. Rows without a shield have no
+    number.
+
+    Args:
+        heading: heading of the column; "" hides the column in tables.
+        shown: fields of `Column`.
+    """
+
+    def measure(own: Episodes, _: Episodes) -> Metric:
+        hours = _get_values(own, "seconds") / 3600
+        return intervals.estimate_burst_rate(_get_values(own, INTERVENTIONS), hours, "1/h")
+
+    return _make_column(
+        "interventions_per_hour", heading, measure, **{"digits": 0, "counted": True, **shown}
+    )
+
+
+def list_safety_columns() -> tuple[Column, ...]:
+    """Return the columns of contacts by kind, severe contacts and interventions in an hour."""
+    kinds = (
+        rate(f"contacts_{kind}", f"contacts {kind} [1/h]", f"{kind}_per_hour", "hour")
+        for kind in KINDS
+    )
+    every = [f"contacts_{kind}" for kind in KINDS]
+    return (
+        *kinds,
+        rate(every, "contacts [1/h]", "contacts_per_hour", "hour"),
+        share_above_force_limit(),
+        interventions(),
+    )
+
+
+def _estimate(statistic: str, values: Floats, exposure: Floats, unit: str) -> Metric:
+    """Return the sum of a statistic per exposure, with the interval that its kind requires."""
+    if statistic in RARE:
+        return intervals.estimate_rate(values, exposure, unit)
+    if statistic == INTERVENTIONS:
+        return intervals.estimate_burst_rate(values, exposure, unit)
+    if statistic in (ACHIEVED, FAILED):
+        return intervals.estimate_goal_rate(values, exposure, unit)
+    return intervals.estimate_ratio(values, exposure, unit)
 
 
 def _make_column(
@@ -260,13 +356,10 @@ def _make_column(
     heading: str,
     measure: Measure,
     is_paired: bool = False,
-    signed: bool = False,
     **shown: Unpack[Shown],
 ) -> Column:
     """Return a column for the metric `ROW.name`."""
-    return Column(
-        f"{{}}.{name}", heading, measure=measure, is_paired=is_paired, signed=signed, **shown
-    )
+    return Column(f"{{}}.{name}", heading, measure=measure, is_paired=is_paired, **shown)
 
 
 def _get_values(episodes: Episodes, statistic: str) -> Floats:

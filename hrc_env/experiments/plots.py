@@ -39,7 +39,10 @@ def stamp(path: Path, text: str) -> None:
 
 
 def compute_error_bars(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
-    """Return the distances (2, n) from values to the lower and upper ends of their intervals."""
+    """Return the distances (2, n) from values to the lower and upper ends of their intervals.
+
+    Metrics without an interval have NaN, for which no bar is drawn.
+    """
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
 
 

@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric, provenance, write_results, write_whole
+from hrc_env.evaluation.intervals import ALPHA, HOLM, MIN_SEEDS
 from hrc_env.experiments.columns import Column, Key
 from hrc_env.experiments.plots import stamp
 
@@ -31,6 +32,47 @@ th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: l
 td { white-space: nowrap; }
 code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 """
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """The conditions of a safety study, which the notes of all of its tables name."""
+
+    people: str
+    """Kind of people."""
+    scene: str
+    """Name or description of the scene."""
+    perception: str
+    """Level of perception, or where the table names it."""
+    chosen_on: str
+    """Seeds on which settings were chosen, such as margins or policies."""
+    worker: str = "any"
+    """Choice of the workers' bodies."""
+    seeds: str = ""
+    """Seeds of the episodes from which the numbers were computed; a `Study` with rows states its
+    own."""
+
+    @property
+    def words(self) -> str:
+        """The conditions as a sentence."""
+        bodies = "`any`, which draws one of all bodies for each worker and episode"
+        return (
+            f"Body: {bodies if self.worker == 'any' else f'`{self.worker}`'}; people: "
+            f"{self.people}; scene: {self.scene}; perception: {self.perception}. Played on "
+            f"{self.seeds}; {self.chosen_on}."
+        )
+
+
+SHIELD_CHOSEN_ON = (
+    "the shield's capsules were fitted on episodes of seed 9,600,000, and the seeds on which its "
+    "other defaults were chosen were not recorded"
+)
+"""Text on the seeds on which the settings of the built-in shields were chosen."""
+
+
+def format_seeds(seeds: Sequence[int]) -> str:
+    """Return the range of consecutive seeds as text."""
+    return f"seeds {min(seeds):,} to {max(seeds):,}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +97,8 @@ class Table:
     name."""
     printed: Mapping[str, float] = field(default_factory=dict)
     """Values that other publications report, by the names of the corresponding metrics."""
+    conditions: Conditions | None = None
+    """Conditions of a safety study, which the note names; None for other studies."""
 
     def check(self, known: Collection[str]) -> None:
         """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.
@@ -99,6 +143,47 @@ class Table:
         names = {name for row in self.rows for c in self.columns for name in c.list_metrics(row)}
         return (names | {c.metric for c in self.numbers.values()}) - self.printed.keys()
 
+    def list_unmeasured(self, metrics: Metrics) -> list[Column]:
+        """Return the columns for which no row has a metric.
+
+        Args:
+            metrics: metrics by name.
+        """
+        known = {*metrics, *self.printed}
+        return [
+            column
+            for column in self.columns
+            if not any({*column.list_metrics(row)} <= known for row in self.rows)
+        ]
+
+    def describe_intervals(self, metrics: Metrics) -> str:
+        """Return sentences on missing intervals and on the dots of differences; "" if not needed.
+
+        Args:
+            metrics: metrics by name.
+        """
+        shown = [
+            (column, name)
+            for row in self.rows
+            for column in self.columns
+            if column.shows in ("value", "value of n") and not column.plain
+            for name in column.list_metrics(row)[:1]
+            if name in metrics and math.isfinite(metrics[name].value)
+        ]
+        sentences = []
+        if any(has_no_interval(metrics[name]) for _, name in shown):
+            sentences.append(TOO_FEW_SEEDS)
+        tested = [name_adjusted(name) for column, name in shown if column.signed and column.marked]
+        known = [metrics[name] for name in tested if name in metrics]
+        if any(math.isfinite(each.value) for each in known):
+            sentences.append(
+                f"A dot marks a difference with a p-value below {ALPHA:g} after Holm's correction "
+                f"for the {known[0].n} contrasts of the study."
+            )
+        elif tested:
+            sentences.append("No difference is marked, as there are no adjusted p-values.")
+        return " ".join(sentences)
+
     def format_number(self, name: str, metrics: Metrics) -> str:
         """Return one of `numbers` in a format for sentences.
 
@@ -112,7 +197,8 @@ class Table:
         """Return the note with its numbers; the counts of missing metrics are 0."""
         n = defaultdict(int, {name: metric.n for name, metric in metrics.items()})
         numbers = {name: self.format_number(name, metrics) for name in self.numbers}
-        return self.note.format(n=n, **numbers)
+        conditions = "" if self.conditions is None else self.conditions.words
+        return " ".join(filter(None, (self.note.format(n=n, **numbers), conditions)))
 
     def to_markdown(self, metrics: Metrics, intervals: bool = True) -> str:
         """Return the table in Markdown with its title and note; rows without numbers are left out.
@@ -134,7 +220,9 @@ class Table:
             return ""
         heads = (*self.heads, *(each.heading for each in columns))
         text = format_table(heads, lines, len(self.heads))
-        return "\n\n".join(filter(None, (f"**{self.title}**", text, self.format_note(metrics))))
+        shown = replace(self, columns=columns).describe_intervals(metrics)
+        note = " ".join(filter(None, (self.format_note(metrics), shown)))
+        return "\n\n".join(filter(None, (f"**{self.title}**", text, note)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +270,7 @@ def describe_quick_run(
     n: int,
     seconds: float | tuple[float, float],
     unit: str = "seed",
-    consequence: str = "too few for comparisons",
+    consequence: str = "",
 ) -> str:
     """Return the warning in the report of a quick run.
 
@@ -190,22 +278,43 @@ def describe_quick_run(
         n: maximum number of seeds or other repetitions.
         seconds: duration of a repetition [s], or (shortest, longest) if durations differ.
         unit: name of a repetition, in the singular.
-        consequence: the conclusion that readers should draw.
+        consequence: the conclusion that readers should draw; "": too few for comparisons.
     """
+    if not consequence:
+        is_few = unit == "seed" and n < MIN_SEEDS
+        consequence = f"too few {'seeds for intervals and' if is_few else 'for'} comparisons"
     least, most = seconds if isinstance(seconds, tuple) else (seconds, seconds)
     duration = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"
     return f"Quick run, {n} {unit}{'' if n == 1 else 's'} of {duration}: {consequence}."
 
 
+MAX_DIGITS = 6
+"""Largest number of decimals to which small numbers extend a table's."""
+TOO_FEW_SEEDS = (
+    f"Cells without an interval have too few seeds (fewer than {MIN_SEEDS}), or resamples of the "
+    "seeds without a finite value."
+)
+"""Sentence below tables with numbers from too few seeds."""
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
 _TABLE = re.compile(r"^\|---", re.M)
+_DOT_SENTENCE = re.compile(r" ?A dot marks [^\n]*? of the study\.")
 _DOT = " ●"
-"""Mark for a difference with an interval that excludes zero."""
+"""Mark for a difference with an adjusted p-value below `ALPHA`."""
+
+
+def has_no_interval(metric: Metric) -> bool:
+    """Return whether a metric has a value, but no interval."""
+    return math.isfinite(metric.value) and math.isnan(metric.low)
+
+
+def name_adjusted(difference: str) -> str:
+    """Return the name of the adjusted p-value of a difference by the difference's name."""
+    return HOLM + difference.removeprefix("difference.")
 
 
 def _add_warning(part: str, words: str) -> str:
     """Return a part of a report without marks, and with a warning below its table or figure."""
-    part = part.replace(_DOT, "")
+    part = _DOT_SENTENCE.sub("", part.replace(_DOT, ""))
     is_shown = _TABLE.search(part) or _FIGURE.search(part)
     return f"{part}\n\n*{words}*" if is_shown else part
 
@@ -231,7 +340,7 @@ def format_table(header: Sequence[str], rows: Iterable[Sequence[str]], n_heads: 
 def format_metrics(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
-    """Return a table of metrics in Markdown, or "" if there are none.
+    """Return a table of metrics in Markdown with its sentences on intervals, or "" without metrics.
 
     Args:
         name: heading of the rows.
@@ -239,8 +348,12 @@ def format_metrics(
         columns: columns of metrics.
         metrics: metrics by name.
     """
-    lines = format_rows({row: (words,) for row, words in rows.items()}, columns, metrics)
-    return format_table((name, *(c.heading for c in columns)), lines) if lines else ""
+    table = Table("", "", {row: (words,) for row, words in rows.items()}, columns, (name,))
+    lines = format_rows(table.rows, columns, metrics)
+    if not lines:
+        return ""
+    text = format_table((name, *(c.heading for c in columns)), lines)
+    return "\n\n".join(filter(None, (text, table.describe_intervals(metrics))))
 
 
 def format_rows(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list[tuple[str, ...]]:
@@ -261,6 +374,8 @@ def format_rows(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list
 def format_cell(column: Column, metrics: Metrics, row: Key) -> str:
     """Return the number of a row in the format of a column, or a dash if there is none.
 
+    A zero is shown with its interval even if the column shows none.
+
     Args:
         column: the column, which names the metric and defines its format.
         metrics: metrics by name.
@@ -274,17 +389,22 @@ def format_cell(column: Column, metrics: Metrics, row: Key) -> str:
         return f"{metric.n:,}"
     if column.shows == "count":
         return f"{round(metric.value * metric.n)} of {metric.n}"
-    is_plain = column.plain or bool(others)
-    shown = replace(metric, low=metric.value, high=metric.value) if is_plain else metric
+    is_plain = (column.plain and metric.value != 0) or bool(others)
+    shown = replace(metric, low=math.nan, high=math.nan) if is_plain else metric
     text = format_metric(shown, column.scale, column.digits, column.signed)
     for other in others:
         text += f" ({column.scale * other.value:,.{column.digits}f})"
-    is_different = column.signed and (shown.low > 0 or shown.high < 0)
-    return text + (_DOT if column.marked and is_different else "")
+    if column.shows == "value of n" and math.isfinite(metric.value):
+        text += f" of {metric.n:,}"
+    p = metrics.get(name_adjusted(names[0])) if column.signed and column.marked else None
+    return text + (_DOT if p is not None and p.value < ALPHA else "")
 
 
 def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
     """Return a number with its interval in the format of tables, or a dash if it is not finite.
+
+    A number that was 0 in every one of several observations is followed by their number, because
+    its interval would have zero width.
 
     Args:
         metric: the number with its interval.
@@ -294,24 +414,34 @@ def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: b
     """
     if not math.isfinite(metric.value):
         return "-"
+    sign, value = "+" if signed else "", scale * metric.value
+    if metric.value == metric.low == metric.high == 0 and metric.n > 1:
+        return f"{format_interval(value, math.nan, math.nan, digits, sign)} in all {metric.n:,}"
     low, high = sorted((scale * metric.low, scale * metric.high))
-    return format_interval(scale * metric.value, low, high, digits, "+" if signed else "")
+    return format_interval(value, low, high, digits, sign)
 
 
 def format_interval(value: float, low: float, high: float, digits: int, sign: str = "") -> str:
     """Return a value with the ends of its interval in brackets.
 
-    The interval is left out if all three numbers are equal at this number of decimals.
+    The interval is left out if its ends are not finite, or if all three numbers are equal at this
+    number of decimals. Numbers that would all be shown as zero have as many decimals as needed to
+    tell the greatest from zero.
 
     Args:
         value: the value.
-        low: low end of the interval.
-        high: high end of the interval.
+        low: low end of the interval; NaN without an interval.
+        high: high end of the interval; NaN without an interval.
         digits: number of decimals.
         sign: "+" to show the sign of positive numbers, too.
     """
+    has_interval = math.isfinite(low) and math.isfinite(high)
+    largest = max(abs(low), abs(high)) if has_interval else abs(value)
+    while 0 < largest < 0.5 * 10.0**-digits and digits < MAX_DIGITS:
+        digits += 1
     texts = [f"{number:{sign}z,.{digits}f}" for number in (value, low, high)]
-    return texts[0] if len({*texts}) == 1 else f"{texts[0]} ({texts[1]} to {texts[2]})"
+    is_alone = not has_interval or len({*texts}) == 1
+    return texts[0] if is_alone else f"{texts[0]} ({texts[1]} to {texts[2]})"
 
 
 def _embed(out: Path, source: str) -> str:

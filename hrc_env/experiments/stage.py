@@ -26,6 +26,8 @@ from hrc_env.vector.shards import Shards
 
 PEOPLE = "unaware"
 """Kind of workers. They ignore the robot: their motion does not depend on its actions."""
+WORKER = "any"
+"""Bodies of the workers: each episode draws one of all bodies."""
 N_TOGETHER = 300
 """Maximum number of episodes that are played as one batch."""
 Rows = dict[str, list[Any]]
@@ -73,7 +75,8 @@ class Stage:
         if (k, n_episodes) not in self._envs:
             settings = resolve_settings(
                 perception=self.setup.level, estimator=self.setup.estimator, people=PEOPLE,
-                faults=list(turn.faults), cameras=list(turn.cameras), **self.made_with,
+                faults=list(turn.faults), cameras=list(turn.cameras), config={"worker": WORKER},
+                **self.made_with,
             )  # fmt: skip
             threads = 1 if self.setup.level == "pixels" else min(n_cores(), n_episodes)
             with warnings.catch_warnings():

@@ -17,10 +17,19 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.engines.files import carried
 from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.evaluation.intervals import P, adjust_metrics
+from hrc_env.evaluation.sums import STATISTICS
 from hrc_env.experiments.agents import AgentChoice, check_choice, describe_agent, get_agent_factory
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.report import (
+    Conditions,
+    Metrics,
+    Report,
+    Table,
+    describe_quick_run,
+    format_seeds,
+)
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.versions import check_subsystems, hash_source, make_key
@@ -155,6 +164,8 @@ class Study:
     """Text below the table, as in `Table.note`."""
     tables: tuple[Table, ...] = ()
     """Tables to show; if empty, one table of all rows and columns is shown."""
+    conditions: Conditions | None = None
+    """Conditions of a safety study, which the notes of its tables name together with its seeds."""
     derive: Callable[[Metrics], Metrics] | None = None
     """Function that computes further metrics from those of the columns."""
     n_quick: int = 4
@@ -266,7 +277,10 @@ class Study:
 
     def _make_part(self, name: str, shard: Shard) -> Part:
         row = self.rows[name]
-        made_of = {"row": row.settings(), "first_seed": shard.first_seed, "n": shard.n_episodes}
+        made_of = {
+            "row": row.settings(), "first_seed": shard.first_seed, "n": shard.n_episodes,
+            "statistics": STATISTICS,
+        }  # fmt: skip
         sent = replace(row, agent=carried(row.agent)) if isinstance(row.agent, str) else row
         make = partial(play_shard, sent, shard.first_seed, shard.n_episodes, self.threads)
         label = f"{name.replace('/', '.')}.{shard.first_seed}"
@@ -278,18 +292,27 @@ class Study:
         for name, row in self.rows.items():
             own, theirs = played[name], played[row.baseline or name]
             for column in self.columns:
+                beside, metric = theirs[: len(own)], column.metric.format(name)
                 if column.measure is not None:
-                    beside = theirs[: len(own)]
-                    metrics[column.metric.format(name)] = column.measure(own, beside)
+                    metrics[metric] = column.measure(own, beside)
+                if column.test is not None and row.baseline != name:
+                    metrics[f"{P}{metric}"] = column.test(own, beside)
+        metrics |= adjust_metrics(metrics)
         return metrics if self.derive is None else {**metrics, **self.derive(metrics)}
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the report and of the documentation."""
-        if self.tables:
-            return self.tables
-        rows = {name: row.cells for name, row in self.rows.items() if row.is_shown}
-        columns = [column for column in self.columns if column.heading]
-        return (Table(self.name, self.title, rows, columns, self.heads, self.note),)
+        tables = self.tables
+        if not tables:
+            rows = {name: row.cells for name, row in self.rows.items() if row.is_shown}
+            columns = [column for column in self.columns if column.heading]
+            tables = (Table(self.name, self.title, rows, columns, self.heads, self.note),)
+        if self.conditions is None:
+            return tables
+        conditions = self.conditions
+        if self.rows:
+            conditions = replace(conditions, seeds=format_seeds(self.seeds))
+        return tuple(replace(table, conditions=conditions) for table in tables)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Return the tables as a report.

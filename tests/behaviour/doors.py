@@ -13,10 +13,11 @@ import json
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest import mock
 
 import gymnasium
 import mujoco
@@ -655,13 +656,31 @@ def _put(config: dict[str, Any], path: str, value: Any) -> None:
 # --- Learning (learning.py) ----------------------------------------------------------------------
 
 
-NOT_RECORDED = ("is_success", "proximity")
-"""What curves and scores hold since the recordings were made."""
+NOT_RECORDED = (
+    "is_success", "proximity", "contacts_rated", "contacts_above_limit", "interventions",
+    "contacts_per_hour", "contacts_towards_per_hour", "contacts_fleeing_per_hour",
+    "contacts_standing_per_hour", "interventions_per_hour",
+)  # fmt: skip
+"""What curves, episodes and scores hold since the recordings were made."""
+
+
+@contextlib.contextmanager
+def intervals_of_few_seeds() -> Iterator[None]:
+    """Let few or equal seeds have bootstrap intervals, as when the recordings were made."""
+    from hrc_env.evaluation import episodes, intervals
+
+    def estimate_goals(goals: Sequence[float], minutes: Sequence[float]) -> Any:
+        estimate = intervals.estimate_ratio if any(goals) else intervals.estimate_rate
+        return estimate(goals, minutes, "1/min")
+
+    few = mock.patch.object(intervals, "MIN_SEEDS", 1)
+    with few, mock.patch.object(episodes, "estimate_goal_rate", estimate_goals):
+        yield
 
 
 def _score(score: Any) -> dict[str, NDArray[np.float64]]:
     """Return a score, as it is recorded."""
-    named = dataclasses.asdict(score).items()
+    named = score.numbers().items()
     kept = {name: value for name, value in named if name not in NOT_RECORDED}
     return {f"score/{name}": np.array([float(value)]) for name, value in kept.items()}
 
@@ -692,7 +711,7 @@ def learn(
             if not name.endswith("_s") and name not in NOT_RECORDED:  # but for the clock's
                 values[f"run_{k}/{name}"] = value
     values |= _score(training.judge(asked, folder, console))
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), intervals_of_few_seeds():
         export.run(ExportRequest(run_folder=folder, name="probe", out=folder, episodes=4))
     (folder / env_id / "probe.safetensors").rename(folder / EXPORTED)
     card = folder / env_id / "probe.json"
@@ -791,7 +810,8 @@ def judge_agent(
     options = {"task": env_id, "perception": "keypoints", **options}
     shares: list[float] = []
     episodes = play(make, n_episodes, played.EVALUATION_SEED, tick=shares.append, **options)
-    worth = played.measure(episodes)
+    with intervals_of_few_seeds():
+        worth = played.measure(episodes)
     return {
         **_columns(episodes),
         "progress": np.cumsum(shares),
@@ -808,7 +828,8 @@ def torch_on_one_thread() -> None:
 
 
 def _columns(rows: Sequence[Mapping[str, float]]) -> dict[str, NDArray[np.float64]]:
-    names = [name for name in rows[0] if name != "t"] if rows else []  # but for the clock's
+    left_out = {"t", *NOT_RECORDED}  # the first is the clock's
+    names = [name for name in rows[0] if name not in left_out] if rows else []
     return {name: np.array([float(each[name]) for each in rows]) for name in names}
 
 

@@ -43,6 +43,9 @@ TINY = Impact(
 )
 
 
+CONDITIONS = TINY.conditions
+
+
 def silent(share, label):
     """Say nothing."""
 
@@ -55,6 +58,7 @@ def sums(*steps, margin_m=0.0):
     info = {"safety/min_separation_m": np.array([0.5])}
     info |= {f"task/goals_{what}": np.zeros(1) for what in ("reached", "missed")}
     info |= {f"safety/contacts_{how}": np.zeros(1) for how in KINDS}
+    info |= {f"safety/contact_{what}": np.zeros(1) for what in ("severity", "force_ratio")}
     infos = [info | {"cost": touch} for touch in touching]
     return {name: value[0] for name, value in sum_episodes(played, infos, margin_m, 0.04).items()}
 
@@ -163,6 +167,8 @@ def test_every_row_says_everything(end_to_end):
         for setup in TINY.setups:
             for key in keys:
                 assert np.isfinite(metrics[f"{policy}.{setup}.{key}"].value), (policy, setup, key)
+            assert f"{policy}.{setup}.above_force_limit" in metrics
+            assert f"{policy}.{setup}.interventions" not in metrics  # there is no shield
     for policy in TINY.policies:
         for what in (*COMPARED, "z_d_m"):
             less, ours, theirs = (
@@ -175,7 +181,8 @@ def test_every_row_says_everything(end_to_end):
             )
             if what != "separation_min_m":  # which rows give as a mean of the middle half
                 assert less == pytest.approx(ours - theirs, abs=1e-9)
-            assert 0 < metrics[f"p.{policy}.truth.{what}"].value <= 1
+            for p in ("p", "p_holm"):  # of two seeds
+                assert np.isnan(metrics[f"{p}.{policy}.truth.{what}"].value)
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)
     asked = tables.asked("impact") | tables.asked("lateness")
@@ -259,7 +266,7 @@ def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
     config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
     table = config.play(PartCache(tmp_path / "parts", "", 1, silent))
-    found = make_report(tmp_path / "figures", table, metrics, {"scripted": "scripted"})
+    found = make_report(tmp_path / "figures", table, metrics, {"scripted": "scripted"}, CONDITIONS)
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
 
@@ -300,20 +307,27 @@ def test_a_policy_that_did_not_learn_is_left_out_and_named(tmp_path):
     table = played({"scripted": 5.0, "ppo": 0.0})
     metrics = compute_metrics(table, ())
     robots = {"scripted": "scripted", "ppo": "ppo"}
-    found = make_report(tmp_path / "figures", table, metrics, robots)
+    found = make_report(tmp_path / "figures", table, metrics, robots, CONDITIONS)
     assert "`ppo` did not learn its task (0.0 goals per minute" in found.question
     assert not any("| ppo" in part for part in found.parts)
-    alone = make_report(tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"})
+    alone = make_report(
+        tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"}, CONDITIONS
+    )
     assert alone.parts == ()
-    learnt = make_report(tmp_path / "figures", played({"scripted": 5.0, "ppo": 4.0}),
-                    compute_metrics(played({"scripted": 5.0, "ppo": 4.0}), ()), robots)  # fmt: skip
+    both = played({"scripted": 5.0, "ppo": 4.0})
+    metrics = compute_metrics(both, ())
+    learnt = make_report(tmp_path / "figures", both, metrics, robots, CONDITIONS)
     assert "did not learn" not in learnt.question
 
 
 def test_nothing_empty_is_printed_of_one_setup_and_one_robot(tmp_path):
     table = {key: row for key, row in played({"scripted": 5.0}).items() if key[1] == REFERENCE}
     found = make_report(
-        tmp_path / "figures", table, compute_metrics(table, ()), {"scripted": "scripted"}
+        tmp_path / "figures",
+        table,
+        compute_metrics(table, ()),
+        {"scripted": "scripted"},
+        CONDITIONS,
     )
     assert len(found.parts) == 2
     assert "paired" not in "".join(found.parts[1:])
@@ -407,25 +421,29 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
         assert quick.is_quick
     config = replace(
         make_experiment(quick=True),
-        n_seeds=3,
+        n_seeds=8,
         policies=("scripted_slowed",),
         setups=("truth", REFERENCE),
     )
     table = {}
     for name, reached in ((REFERENCE, 1.0), ("truth", 9.0)):
         episode = sums((0.3, 0.3, 0.1, 0.0), (0.2, 0.2, 0.1, 0.0)) | {"walk": "", "goals": reached}
-        table["scripted_slowed", name] = {what: [each] * 3 for what, each in episode.items()}
+        table["scripted_slowed", name] = {what: [each] * 8 for what, each in episode.items()}
     metrics = compute_metrics(table, ())
-    assert metrics["difference.scripted_slowed.truth.goals_per_min"].low > 0
+    difference = "scripted_slowed.truth.goals_per_min"
+    assert metrics[f"difference.{difference}"].low > 0
+    assert metrics[f"p.{difference}"].value == 2 / 2**8
+    assert metrics[f"p_holm.{difference}"].value == 11 * 2 / 2**8  # of eleven contrasts
+    metrics |= {f"p_holm.{difference}": Metric(0.01, 0.01, 0.01, "p", 11)}
     found = config.report(table, metrics, tmp_path / "figures")
     replace(found, quick=config.quick_note).write(tmp_path, {}, [0], metrics)
     for page in ("report.md", "report.html"):
         text = (tmp_path / page).read_text()
-        assert "This run was quick: 3 episodes of 4 s per row" in text
+        assert "This run was quick: 8 episodes of 4 s per row" in text
         assert "not enough to compare estimators" in text
         assert "●" not in text
-        assert "a dot" not in text
-        assert text.count("Quick run, 3 seeds of 4 s: too few") == 4  # above, a figure, two tables
+        assert "A dot" not in text
+        assert text.count("Quick run, 8 seeds of 4 s: too few") == 4  # above, a figure, two tables
     whole = make_experiment().report(table, metrics, tmp_path / "figures")
     assert "quick" not in whole.title + whole.question
     assert "●" in str(whole.parts)

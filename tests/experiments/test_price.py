@@ -25,6 +25,7 @@ from hrc_env.experiments.price.experiment import (
 )
 from hrc_env.experiments.price.metrics import (
     CONTRASTS,
+    N_DRAWS,
     Played,
     Row,
     compute_metrics,
@@ -236,7 +237,9 @@ def test_a_wider_shield_intervenes_more_and_covariances_are_told():
     assert sum(wide["achieved"]) < sum(narrow["achieved"])
     assert narrow["walk"] == wide["walk"]
     alone = EpisodeRunner(list_setups()["truth"], "HRCReach-v0", 60, is_shielded=False)
-    assert alone.play(seeds, 0.0, lambda share: None) == narrow
+    bare = alone.play(seeds, 0.0, lambda share: None)
+    assert narrow.pop("interventions") == [0] * 8 < wide["interventions"]
+    assert bare == narrow  # without a shield, interventions are absent
     alone.close()
 
 
@@ -265,8 +268,11 @@ def test_every_row_says_everything(end_to_end):
                      "confirmed.goals_per_min", "confirmed.cost"):  # fmt: skip
             assert f"HRCReach-v0.{name}.{what}" in metrics
         margin = metrics[f"HRCReach-v0.{name}.margin_m"]
-        assert -1.2 <= margin.low <= margin.value <= margin.high <= 1.2
-    assert metrics["HRCReach-v0.truth.of_truth"] == Metric(1.0, 1.0, 1.0, "share", 6)
+        assert -1.2 <= margin.value <= 1.2
+        assert np.isnan([margin.low, margin.high]).all()  # six seeds
+    assert metrics["HRCReach-v0.truth.of_truth"] == Metric(1.0, np.nan, np.nan, "share", 6)
+    assert "HRCReach-v0.truth.confirmed.interventions" in metrics
+    assert "HRCReach-v0.unshielded.interventions" not in metrics
     text = (out / "report.md").read_text()
     assert "true joints" in text
     assert (out / "figures" / "price.png").exists()
@@ -317,8 +323,26 @@ def row(rng, goals: float) -> Row:
     }
     fresh = {"towards": found.fresh_events, "achieved": found.fresh_achieved + goals,
              "minutes": found.fresh_minutes, "walk": list(range(60))}  # fmt: skip
-    nothing = dict.fromkeys(("standing", "away", "cost"), np.zeros(60))
+    names = ("standing", "away", "cost", "contacts_rated", "contacts_above_limit")
+    nothing = dict.fromkeys(names, np.zeros(60))
     return Row(searches, found.fresh_margin_m, {**fresh, **nothing})
+
+
+def test_contrasts_have_p_values_that_are_adjusted_for_their_number():
+    """A setup that equals the reference but for luck differs from it in no mark."""
+    more = {"truth": 1.0, "particle": 0.6, "one_camera": 0.0}
+    rows = {name: row(np.random.default_rng(0), goals) for name, goals in more.items()}
+    rows["two_cameras"] = row(np.random.default_rng(1), 0.6)
+    alone = {"HRCReach-v0": rows["truth"].fresh}
+    found = compute_metrics(Played({"HRCReach-v0": rows}, alone, {}), 30.0)
+    names = ("truth", "one_camera", "two_cameras")
+    single, adjusted = (
+        np.array([found[f"{p}.worth.{name}"].value for name in names]) for p in ("p", "p_holm")
+    )
+    assert (single[:2] == 2 / (N_DRAWS + 1)).all()
+    assert single[2] > 0.05
+    np.testing.assert_allclose(adjusted[:2], 3 * single[:2])
+    assert found["p_holm.worth.truth"].n == 3
 
 
 def test_setups_are_compared_draw_by_draw():
@@ -377,7 +401,7 @@ def test_ones_own_robot_has_a_price(tmp_path):
     assert metrics["HRCReach-v0.unshielded.goals_per_min"].value == 0
     text = (tmp_path / "report.md").read_text()
     assert "the robot that the agent `random` drives" in text
-    assert "Quick run, 5 seeds of 0.32 s: too few for comparisons" in text
+    assert "Quick run, 5 seeds of 0.32 s: too few seeds for intervals" in text
     settings = json.loads((tmp_path / "results.json").read_text())["config"]
     assert settings["agent"] == "random"
 

@@ -135,17 +135,18 @@ def test_a_share_has_the_exact_interval_of_a_binomial_count(k, n):
 
 
 def test_what_always_succeeded_may_fail_as_often_as_seeds_allow():
-    found = intervals.estimate_success([3.0] * 64, [3.0] * 64)
+    found = intervals.estimate_clustered_share([3.0] * 64, [3.0] * 64)
     assert (found.value, found.high, found.n) == (1.0, 1.0, 64)
     assert found.low == pytest.approx(0.025 ** (1 / 64))
-    mixed = intervals.estimate_success([3.0, 1.0], [3.0, 3.0])
-    assert (mixed.value, mixed.low) == (2 / 3, 1 / 3)
+    mixed = intervals.estimate_clustered_share([3.0, 1.0], [3.0, 3.0])
+    assert mixed.value == 2 / 3
+    assert np.isnan([mixed.low, mixed.high]).all()  # two seeds
 
 
 def test_goals_that_were_never_reached_have_a_bound():
     none, some = (intervals.estimate_goal_rate([k] * 30, [1.0] * 30) for k in (0.0, 5.0))
     assert none.high == pytest.approx(3.6889 / 30, abs=1e-4)
-    assert (some.low, some.high) == (5.0, 5.0)
+    assert some == intervals.estimate_rate([5.0] * 30, [1.0] * 30, "1/min")  # not without a width
 
 
 def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
@@ -182,7 +183,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 def test_one_seed_has_no_interval_and_says_so():
     one = intervals.estimate_rmse([4.0], [1.0], "m")
-    assert (one.value, one.low, one.high, one.n) == (2.0, 2.0, 2.0, 1)
+    assert (one.value, one.n) == (2.0, 1)
+    assert np.isnan([one.low, one.high]).all()
 
 
 def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
@@ -195,12 +197,12 @@ def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
 
 
 def test_a_ratio_to_nothing_in_some_draws_still_has_an_interval():
-    found = intervals.estimate_ratio([1.0, 0.0, 2.0], [2.0, 0.0, 4.0], "share")
+    found = intervals.estimate_ratio([1.0, 0.0, 2.0] * 3, [2.0, 0.0, 4.0] * 3, "share")
     assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)
 
 
 def test_a_quantile_draws_whole_seeds():
-    same = [[1.0, 2.0, 3.0]] * 5
+    same = [[1.0, 2.0, 3.0]] * 8
     found = intervals.estimate_quantile(same, 0.5, "m")
     assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
 
@@ -249,7 +251,8 @@ def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
     figure = tmp_path / "figures" / "one.png"
     figure.parent.mkdir()
     figure.write_bytes(b"not really a picture")
-    metrics = {"m.a": Metric(0.1234, 0.1, 0.2, "m", 3), "d.a": Metric(-0.5, -0.7, -0.1, "m", 3)}
+    metrics = {"m.a": Metric(0.1234, 0.1, 0.2, "m", 3), "d.a": Metric(-0.5, -0.7, -0.1, "m", 3),
+               "p_holm.d.a": Metric(0.01, 0.01, 0.01, "p", 4)}  # fmt: skip
     columns = (Column("m.{}", "cm", scale=100), Column("d.{}", "less", signed=True),
                Column("x.{}", "not measured"))  # fmt: skip
     table = report.format_metrics("who", {"a": "a < b"}, columns, metrics)
@@ -307,7 +310,8 @@ def test_differences_of_settings_are_named_and_those_of_code_are_none(tmp_path):
 
 
 def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_path):
-    metrics = {"d.a": Metric(2.0, 1.0, 3.0, "m", 4)}
+    p = Metric(0.001, 0.001, 0.001, "p", 1)
+    metrics = {"d.a": Metric(2.0, 1.0, 3.0, "m", 9), "p_holm.d.a": p}
     column = Column("d.{}", "less [m]", signed=True)
     figure = plots.make_figure(3, 2)
     plots.save(figure, tmp_path / "figures" / "one.png")
@@ -320,7 +324,7 @@ def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_
     quick = replace(whole, quick=report.describe_quick_run(4, 10.0))
     quick.write(tmp_path, {}, [0], metrics)
     text = (tmp_path / "report.md").read_text()
-    assert text.count("Quick run, 4 seeds of 10 s: too few for comparisons.") == 3
+    assert text.count("Quick run, 4 seeds of 10 s: too few seeds for intervals and") == 3
     assert "●" not in text
     after = Image.open(tmp_path / "figures" / "one.png").size
     assert after[0] == before[0]
@@ -344,7 +348,7 @@ METRICS = {"a.x": Metric(0.25, 0.2, 0.5, "share", 8), "b.x": Metric(np.nan, 0.0,
         (Column("{}.x", scale=-1), "a", "-0.2 (-0.5 to -0.2)"),
         (Column("{}.x", shows="count"), "a", "2 of 8"),
         (Column("{}.x", shows="n"), "a", "8"),
-        (Column("{}.x", beside="x.{0}.b", digits=0), "a", "0 (1,234)"),
+        (Column("{}.x", beside="x.{0}.b", digits=0), "a", "0.2 (1,234)"),
         (Column("x.{0}.{1}", beside="{0}.x", digits=0), ("a", "b"), "1,234 (0)"),
         (Column("a.x", digits=2, plain=True), (), "0.25"),
         (Column("{}.x"), "b", "-"),

@@ -18,8 +18,8 @@ Every joint of every frame after the first second counts. If the track is lost, 
 or the prior, is evaluated. *Coverage*: the share of joints within the reported 95 % region; *lost*:
 the share of time without a track; *switches*: changes of a worker from one track to another, per
 minute; *IDF1*: how consistently workers keep their tracks (`hrc_env/tracking/metrics.py`);
-*difference*: from the reference setting, walk by walk; a dot marks an interval that excludes
-zero."""
+*difference*: from the reference setting, walk by walk; a dot marks a p-value below .05 after Holm's
+correction for all differences of the study."""
 ABLATIONS: dict[str, Ablation] = {
     ablation.name: ablation
     for ablation in (

@@ -13,10 +13,12 @@ from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import ERRORS_M
 from hrc_env.evaluation.intervals import (
+    MIN_SEEDS,
+    adjust_metrics,
     compare_paired,
+    estimate_clustered_share,
     estimate_mean,
     estimate_rate,
-    estimate_ratio,
     estimate_rmse,
 )
 from hrc_env.evaluation.intervals import estimate_binned_quantile as estimate_quantile
@@ -79,7 +81,7 @@ class Ablations:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a quick run; "" for other runs."""
-        is_short = is_as_short(self, QUICK)
+        is_short = is_as_short(self, QUICK) or self.n_seeds < MIN_SEEDS
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
@@ -149,7 +151,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
         for setting, sums in of_settings.items():
             key = f"{name}.{setting}"
             metrics |= _measure_joints(key, sums)
-            metrics[f"lost.{key}"] = estimate_ratio(sums["lost"], sums["frames"], "share")
+            metrics[f"lost.{key}"] = estimate_clustered_share(sums["lost"], sums["frames"])
             if "idf1" in sums:
                 minutes = np.array(sums["frames"]) * DT_S / 60
                 metrics[f"id_switches.{key}"] = estimate_rate(sums["id_switches"], minutes, "1/min")
@@ -164,7 +166,7 @@ def compute_metrics(played: Played) -> dict[str, Metric]:
                 )
         for seen, sums in _group_by_sight(of_settings).items():
             metrics |= _measure_joints(f"{name}.{seen}", sums)
-    return metrics
+    return metrics | adjust_metrics(metrics)
 
 
 def _measure_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
@@ -173,7 +175,7 @@ def _measure_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
         f"error_m.{key}.median": estimate_quantile(ERRORS_M, sums["errors"], 0.5, "m"),
         f"error_m.{key}.p95": estimate_quantile(ERRORS_M, sums["errors"], 0.95, "m"),
         f"rmse_m.{key}": estimate_rmse(sums["squares"], sums["joints"], "m"),
-        f"coverage95.{key}": estimate_ratio(sums["inside"], sums["joints"], "share"),
+        f"coverage95.{key}": estimate_clustered_share(sums["inside"], sums["joints"]),
     }
 
 

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hrc_env.evaluation.sums import INTERVENTIONS
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
-from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS
+from hrc_env.experiments.impact.metrics import ALL_CONTACTS, COMPARED, NOMINAL_MPS, SEVERE
 from hrc_env.experiments.impact.policies import PPO, SLOWED
-from hrc_env.experiments.report import Table
+from hrc_env.experiments.report import Conditions, Table
 from hrc_env.experiments.setups import LATE, PerceptionSetup, find_setup
 from hrc_env.safety.incidents import MOVING_M_S
 
@@ -20,9 +21,11 @@ exchanged; robots, goals and workers, who ignore the robot, are the same in ever
 All events are counted from the truth. *True cost*: steps closer than 0.15 m plus steps in contact,
 per episode; *while moving towards*: the part of it in steps in which the robot moves towards the
 worker faster than {MOVING_M_S} m/s. The rest comes from workers who walk up to a robot at rest, and
-depends on where it rests. *Contacts* per minute, where touches within half a second count as one,
-are classified by the motion of the robot in the step before: *towards* the worker, *standing arm
-pushed*, *moving away*.
+depends on where it rests. *Contacts* per hour of simulated time, where touches within half a second
+count as one, are classified by the motion of the robot in the step before: *towards* the worker,
+*standing arm pushed*, *moving away*. *Above the force limit*: share of contacts with an estimated
+force above the limit of the touched body region (ISO/TS 15066). *Interventions*: times that the
+shield becomes active, per hour.
 Per 1,000 steps, *near*: closer than {SLOW_M:g} m, the exposure; *approaches*: the robot moves
 towards a worker closer than {STOP_M:g} m; *missed stops*: the true separation is below {STOP_M:g} m
 and the estimated one is not; *false stops*: the reverse. *Z_d*: 95th percentile of the error of all
@@ -37,18 +40,22 @@ _ROW = "{0}.{1}."
 """Prefix of the names of metrics, with placeholders for the policy and the setup."""
 COLUMNS = (
     Column(_ROW + "goals_per_min", "goals [1/min]"),
-    Column(_ROW + "contacts_towards", "contacts towards [1/min]", 2, counted=True),
+    Column(_ROW + "contacts_towards", "contacts towards [1/h]", 1, 60, counted=True),
+    Column(_ROW + SEVERE, "contacts above the force limit [%]", 0, 100, counted=True,
+           shows="value of n"),
     Column(_ROW + "approaches", f"approaches {_STEPS}"),
     Column(_ROW + "missed_stops", f"missed stops {_STEPS}"),
     Column(_ROW + "false_stops", f"false stops {_STEPS}"),
     Column(_ROW + "z_d_m", "Z_d [m]", 3),
     Column(_ROW + "cost", "true cost [per episode]"),
     Column(_ROW + "cost_towards", "true cost while moving towards [per episode]"),
-)
+)  # fmt: skip
 """Columns of the tables in the documentation and in the report."""
 MORE = (
-    Column(_ROW + "contacts_standing", "standing arm pushed [1/min]", 2, counted=True),
-    Column(_ROW + "contacts_fleeing", "moving away [1/min]", 2, counted=True),
+    Column(_ROW + "contacts_standing", "standing arm pushed [1/h]", 1, 60, counted=True),
+    Column(_ROW + "contacts_fleeing", "moving away [1/h]", 1, 60, counted=True),
+    Column(_ROW + ALL_CONTACTS, "contacts [1/h]", 1, 60, counted=True),
+    Column(_ROW + INTERVENTIONS, "interventions [1/h]", 0, counted=True),
     Column(_ROW + "called_slowings", f"near {_STEPS}", 0),
     Column(_ROW + "separation_min_m", "least separation [m]", 3),
     Column(_ROW + "tax_m", "tax [m]", 2),
@@ -56,7 +63,7 @@ MORE = (
 """Further columns of the tables in the report."""
 ONE = PerceptionSetup(n_cameras=1).name
 NUMBERS = {
-    "contacts_with_one": Column(f"difference.{SLOWED}.{ONE}.contacts_towards", digits=2),
+    "contacts_with_one": Column(f"difference.{SLOWED}.{ONE}.contacts_towards", digits=0, scale=60),
     "missed_with_one": Column(f"difference.{SLOWED}.{ONE}.missed_stops", digits=0),
     "goals_lost_with_one": Column(f"difference.{PPO}.{ONE}.goals_per_min", scale=-1),
 }
@@ -65,9 +72,10 @@ NOTE = (
     f"step in which the robot moves faster than {100 * MOVING_M_S:g} cm/s towards a worker closer "
     f"than {STOP_M:.2f} m. Missed stop: a step in which the true separation is below {STOP_M:.2f} "
     "m and the estimated one is not; false stop: the reverse. Contacts towards (exact 95 % "
-    "intervals): the robot moved towards the worker in the step before. Z_d: 95th percentile of "
-    "the error of all joints. Fewer than four cameras: the others fail after the first second. "
-    "None: the robot has no track of any worker."
+    "intervals): the robot moved towards the worker in the step before. Above the force limit: "
+    "share of all contacts, by the estimated force and the limit of the touched body region. Z_d: "
+    "95th percentile of the error of all joints. Fewer than four cameras: the others fail after "
+    "the first second. None: the robot has no track of any worker."
 )
 LATENESS = Table(
     "lateness",
@@ -95,31 +103,38 @@ LATENESS = Table(
 )
 
 
-def make_results_table(policy: str, setups: Sequence[str]) -> Table:
+def make_results_table(
+    policy: str, setups: Sequence[str], conditions: Conditions | None = None
+) -> Table:
     """Return the table of a policy, with one row per setup.
 
     Args:
         policy: label of the policy.
         setups: names of perception setups.
+        conditions: conditions of the episodes.
     """
     rows = {(policy, s): (find_setup(s).words,) for s in setups}
-    return Table("results", f"`{policy}`", rows, (*COLUMNS, *MORE), ("perception",))
+    columns = (*COLUMNS, *MORE)
+    return Table("results", f"`{policy}`", rows, columns, ("perception",), conditions=conditions)
 
 
-def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> Table:
+def make_differences_table(
+    policy: str, setups: Sequence[str], marked: bool, conditions: Conditions | None = None
+) -> Table:
     """Return the table of a policy's differences from the reference setup.
 
     Args:
         policy: label of the policy.
         setups: names of perception setups, without the reference.
-        marked: whether a difference is marked if its interval excludes zero.
+        marked: whether a difference with an adjusted p-value below .05 is marked.
+        conditions: conditions of the episodes.
     """
     columns = [
         replace(each, metric=f"difference.{each.metric}", signed=True, marked=marked)
         for each in (*COLUMNS, *MORE)
         if each.metric.removeprefix(_ROW) in (*COMPARED, "z_d_m")
     ]
-    return replace(make_results_table(policy, setups), columns=columns)
+    return replace(make_results_table(policy, setups, conditions), columns=columns)
 
 
 def make_documentation_table(setups: Sequence[str]) -> Table:

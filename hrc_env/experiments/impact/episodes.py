@@ -19,6 +19,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.rollout import rollout
+from hrc_env.evaluation.sums import count_interventions, count_severe
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.stage import EndlessEpisodes, Rows, Stage
@@ -176,6 +177,8 @@ def sum_episodes(
         "minutes": np.full(cost.shape[1], len(infos) * dt_s / 60),
         **_count_decisions(steps, margin_m),
         **{f"contacts_{how}": infos[-1][f"safety/contacts_{how}"] for how in KINDS},
+        **count_severe(infos),
+        **count_interventions(infos),
         **_count_values(steps),
     }
     rows = {name: value.tolist() for name, value in sums.items()}

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +17,7 @@ from hrc_env.experiments.impact.metrics import Played, compute_metrics
 from hrc_env.experiments.impact.policies import (
     POLICIES,
     PPO,
+    SEED,
     SLOWED,
     WORDS,
     Policy,
@@ -26,7 +27,15 @@ from hrc_env.experiments.impact.policies import (
     train_once,
 )
 from hrc_env.experiments.impact.report import make_report
-from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.report import (
+    SHIELD_CHOSEN_ON,
+    Conditions,
+    Metrics,
+    Report,
+    Table,
+    describe_quick_run,
+    format_seeds,
+)
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import check_at_least_one, override
 from hrc_env.experiments.setups import (
@@ -37,7 +46,7 @@ from hrc_env.experiments.setups import (
     list_default_setups,
     list_setups,
 )
-from hrc_env.experiments.stage import N_TOGETHER, PEOPLE
+from hrc_env.experiments.stage import N_TOGETHER, PEOPLE, WORKER
 from hrc_env.experiments.versions import hash_source, make_key
 from hrc_env.safety.shield import find_shield
 from hrc_env.tasks import DEFAULT
@@ -155,7 +164,7 @@ class Impact:
         given = {name: each for name, each in asdict(self).items() if name != "trust"}
         if self.control is None:
             del given["control"]
-        return {"people": PEOPLE, **given}
+        return {"people": PEOPLE, "worker": WORKER, **given}
 
     def play(self, cache: PartCache) -> Played:
         """Return the sums of all rows; raise `HRCError` if workers moved differently in any row."""
@@ -163,7 +172,7 @@ class Impact:
         checkpoint, ppo = cache.folder / "ppo.zip", ""
         if PPO in self.policies:
             n = self.learning_steps
-            learnt = {"task": self.task, "people": PEOPLE, "learning_steps": n}
+            learnt = {"task": self.task, "people": PEOPLE, "worker": WORKER, "learning_steps": n}
             key = make_key(learnt, self.depends)
             ppo = train_once(cache, n, checkpoint, key, self.task)
         rows: list[tuple[str, str]] = []
@@ -211,6 +220,7 @@ class Impact:
         """Return the cache key of a part of a row."""
         shared = {
             "people": PEOPLE,
+            "worker": WORKER,
             "task": self.task,
             **({} if self.shield is None else {"shield": self.shield}),
             **({} if control is None else {"control": control}),
@@ -227,12 +237,28 @@ class Impact:
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
-        return (make_documentation_table(self.setups), LATENESS)
+        table = make_documentation_table(self.setups)
+        return tuple(replace(each, conditions=self.conditions) for each in (table, LATENESS))
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of all episodes."""
+        chosen_on = [
+            f"`{PPO}` was trained on seed {SEED}" if PPO in self.policies else "",
+            "" if self.shield is None else SHIELD_CHOSEN_ON,
+            "the limits of the scripted agents were not chosen on any",
+        ]
+        return Conditions(
+            people=f"`{PEOPLE}`", scene=f"`{find_task(self.task).scene}`",
+            perception="`keypoints`, unless a row names another",
+            seeds=format_seeds(self.seeds), chosen_on="; ".join(filter(None, chosen_on)),
+            worker=WORKER,
+        )  # fmt: skip
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure and return the report."""
         robots = label_agents(self.policies, WORDS)
-        return make_report(figures, played, metrics, robots, self.warning)
+        return make_report(figures, played, metrics, robots, self.conditions, self.warning)
 
 
 def _play(label: str, *given: Any) -> Any:

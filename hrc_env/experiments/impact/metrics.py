@@ -22,8 +22,14 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
-from hrc_env.evaluation.intervals import compare_paired, estimate_rate, estimate_ratio, make_ratio
-from hrc_env.evaluation.sums import COST_UNIT
+from hrc_env.evaluation.intervals import (
+    compare_paired,
+    estimate_clustered_share,
+    estimate_rate,
+    estimate_ratio,
+    make_ratio,
+)
+from hrc_env.evaluation.sums import ABOVE, COST_UNIT, INTERVENTIONS, RATED
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.report import Metrics
 from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, find_setup
@@ -39,12 +45,16 @@ CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
 """Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
 """Metrics per minute, with the names of the sums that are divided by the duration."""
+SEVERE, ALL_CONTACTS = "above_force_limit", "contacts"
+"""Metrics: fraction of contacts with a force above the limit of the touched region, and contacts of
+all kinds per minute."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
 """Sums that are reported per 1,000 control steps; `called_slowings` counts steps near the
 worker."""
+PER_1000_UNIT = "per 1000 steps"
 AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
 """Sums that are averaged over episodes, with their units."""
 
@@ -110,7 +120,7 @@ def compute_metrics(table: Played, margins_m: Sequence[float]) -> dict[str, Metr
             if (SLOWED, setup.name) in table:
                 for how, metric in _measure_lateness(setup, table, metrics, margins_m).items():
                     metrics[f"lateness.{setup.name}.{how}"] = metric
-    return metrics
+    return metrics | intervals.adjust_metrics(metrics)
 
 
 def _compare_rows(name: str, row: Row, reference: Row) -> Metrics:
@@ -137,7 +147,18 @@ def _measure_row(row: Row) -> dict[str, Metric]:
     metrics = {
         key: (estimate_rate if key in CONTACTS else estimate_ratio)(*ratio)
         for key, ratio in ratios.items()
+        if key not in PER_1000
     }
+    for key in PER_1000:
+        n_steps = ratios[key].denominator
+        metrics[key] = estimate_clustered_share(row[key], n_steps, PER_1000_UNIT, 1000.0)
+    contacts, minutes = np.sum([row[kind] for kind in CONTACTS], axis=0), np.array(row["minutes"])
+    metrics[ALL_CONTACTS] = estimate_rate(contacts, minutes, "1/min")
+    metrics[SEVERE] = intervals.estimate_share_of(row[ABOVE], row[RATED])
+    if INTERVENTIONS in row:
+        metrics[INTERVENTIONS] = intervals.estimate_burst_rate(
+            row[INTERVENTIONS], minutes / 60, "1/h"
+        )
     goals = ratios["goals_per_min"]
     metrics["goals_per_min"] = intervals.estimate_goal_rate(goals.numerator, goals.denominator)
     metrics["separation_min_m"] = intervals.estimate_iqm(row["separation_min_m"], "m")
@@ -157,7 +178,7 @@ def _compute_ratios(row: Row) -> dict[str, Ratio]:
     for key, name in A_MINUTE.items():
         ratios[key] = Ratio(np.array(row[name], float), minutes, "1/min")
     for key in PER_1000:
-        ratios[key] = Ratio(1000.0 * np.array(row[key]), n_steps, "per 1000 steps")
+        ratios[key] = Ratio(1000.0 * np.array(row[key]), n_steps, PER_1000_UNIT)
     return ratios
 
 

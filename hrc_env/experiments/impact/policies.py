@@ -16,7 +16,7 @@ from hrc_env.engines.files import carried
 from hrc_env.experiments.agents import describe_agent, label_agent
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
-from hrc_env.experiments.stage import PEOPLE
+from hrc_env.experiments.stage import PEOPLE, WORKER
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import DEFAULT
 
@@ -118,10 +118,11 @@ def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT)
 
     env = HRCVecEnv(
         N_ENVS, task=task, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
-        people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
+        people=PEOPLE, config={"worker": WORKER, "reward": {"proximity": PROXIMITY}},
+        num_threads=n_cores(),
     )  # fmt: skip
     learner = train(env, n_steps, SEED, lambda learner: tick(N_ENVS / n_steps))
-    checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
+    checkpoints.save(learner, path, {"people": PEOPLE, "worker": WORKER, "seed": SEED})
     return {"sha256": _hash(path), "n_steps": learner.num_timesteps}
 
 

@@ -1,10 +1,12 @@
 """The report of the impact study: throughput against true cost, rows, differences, and latency."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.experiments.impact.declaration import (
     LATENESS,
     QUESTION,
@@ -16,7 +18,7 @@ from hrc_env.experiments.impact.metrics import Played
 from hrc_env.experiments.impact.policies import PPO, SCRIPTED
 from hrc_env.experiments.impact.policies import WORDS as ROBOTS
 from hrc_env.experiments.plots import compute_error_bars, label_axes, make_figure, save
-from hrc_env.experiments.report import Metrics, Report, format_picture
+from hrc_env.experiments.report import Conditions, Metrics, Report, format_picture
 from hrc_env.experiments.setups import LATE_S, REFERENCE, find_setup
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -42,7 +44,12 @@ ACROSS = {
 
 
 def make_report(
-    figures: Path, table: Played, metrics: Metrics, robots: Mapping[str, str], warning: str = ""
+    figures: Path,
+    table: Played,
+    metrics: Metrics,
+    robots: Mapping[str, str],
+    conditions: Conditions,
+    warning: str = "",
 ) -> Report:
     """Draw the figure and return the report.
 
@@ -51,6 +58,7 @@ def make_report(
         table: rows of episodes.
         metrics: metrics by name.
         robots: agents by their labels in the table.
+        conditions: conditions of the episodes.
         warning: text at the top of the report if the run is too short for comparisons; no
             difference is then marked. "" for other runs.
     """
@@ -71,20 +79,22 @@ def make_report(
     draw_tradeoff(figures / "tradeoff.png", metrics, policies, setups)
     caption = (
         "One point per setup, placed by its paired difference from the reference; bars are 95 % "
-        "intervals. Higher is more goals, further left is safer. Below: approaches instead of "
-        "cost, without setups that have no track."
+        f"intervals, and setups without bars have too few seeds (fewer than {MIN_SEEDS}). Higher "
+        "is more goals, further left is safer. Below: approaches instead of cost, without setups "
+        "that have no track."
     )
     parts = [format_picture(figures / "tradeoff.png", caption)]
-    parts += [make_results_table(policy, setups).to_markdown(metrics) for policy in policies]
-    marks = "" if warning else "; a dot marks an interval that excludes zero"
+    parts += [
+        make_results_table(policy, setups, conditions).to_markdown(metrics) for policy in policies
+    ]
     others = [name for name in setups if name != REFERENCE]
     if others:
-        parts.append(f"Paired differences from {find_setup(REFERENCE).words}{marks}.")
+        parts.append(f"Paired differences from {find_setup(REFERENCE).words}.")
     parts += [
-        make_differences_table(policy, others, not warning).to_markdown(metrics)
+        make_differences_table(policy, others, not warning, conditions).to_markdown(metrics)
         for policy in policies
     ]
-    parts.append(LATENESS.to_markdown(metrics))
+    parts.append(replace(LATENESS, conditions=conditions).to_markdown(metrics))
     return Report(title, "\n\n".join(question), [*filter(None, parts)])
 
 
@@ -101,12 +111,12 @@ def has_learnt(metrics: Metrics, policies: Sequence[str]) -> bool:
     """Return whether PPO has learnt the task, judged with the reference perception.
 
     It has if it reaches at least a quarter of the goals per minute of the best other policy or,
-    without other policies, if the interval of its goals per minute excludes zero.
+    without other policies, if the interval of its goals per minute, if any, excludes zero.
     """
     found = {name: metrics[f"{name}.{REFERENCE}.goals_per_min"] for name in policies}
     others = [each.value for name, each in found.items() if name != PPO]
     if not others or max(others) == 0:
-        return found[PPO].value > 0 and found[PPO].low > 0
+        return found[PPO].value > 0 and not found[PPO].low <= 0
     return found[PPO].value >= LEAST_SHARE * max(others)
 
 

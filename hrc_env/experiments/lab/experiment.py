@@ -11,12 +11,15 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.evaluation.counts import Bins
 from hrc_env.evaluation.intervals import (
+    MIN_SEEDS,
+    adjust_metrics,
     compare_paired,
+    estimate_clustered_share,
     estimate_quantile,
-    estimate_ratio,
-    make_quantile,
+    make_binned_quantile,
 )
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.lab.declaration import ALL, ERRORS, ESTIMATORS, SINGLE
@@ -38,6 +41,8 @@ CROPS = "particle"
 """Name of the estimator that the crops follow."""
 QUANTILES = {"median": 0.5, "p95": 0.95}
 """Quantiles of errors by name."""
+ERRORS_M = Bins(np.geomspace(1e-4, 30.0, 2500))
+"""Bins for position errors [m], in steps of half a percent, from which differences are computed."""
 FIRST_SEED = 200
 """Seed of the first film of each motion."""
 Film = Mapping[str, Any]
@@ -51,7 +56,7 @@ class Lab:
 
     name = "lab"
     depends = ("env", "tracker", "emulator", "detector", "motion")
-    n_seeds: int = 7
+    n_seeds: int = 8
     """Number of films per motion."""
     max_frames: int = 250
     """Maximum number of frames in a film."""
@@ -77,7 +82,7 @@ class Lab:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a quick run; "" for other runs."""
-        is_short = is_as_short(self, QUICK)
+        is_short = is_as_short(self, QUICK) or self.n_seeds < MIN_SEEDS
         return describe_quick_run(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
@@ -174,14 +179,18 @@ def compute_metrics(played: Films) -> dict[str, Metric]:
                 metrics[f"error_m.{key}.{motion}.{word}"] = estimate_quantile(errors, q, "m")
         metrics |= _measure_misses(films, motion)
     for column in CAMERA_LABELS:
-        errors = [_read_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
+        ours = _count_errors(played, f"{ESTIMATORS[0]}.{column}")
         for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
-            theirs = [_read_errors_m(each, f"{other}.{column}") for each in played.values()]
-            both = make_quantile([each.ravel() for each in (*errors, *theirs)], q)
-            metrics |= compare_paired(
-                f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400
-            )
-    return metrics
+            counts = [*ours, *_count_errors(played, f"{other}.{column}")]
+            both = make_binned_quantile(ERRORS_M, counts, q)
+            metrics |= compare_paired(f"error_m.{other}.{column}.{word}", both, len(ours), "m", 400)
+    return metrics | adjust_metrics(metrics)
+
+
+def _count_errors(played: Films, key: str) -> Ints:
+    """Return histograms (n, bins) of the errors of an estimate, one per film."""
+    errors = (_read_errors_m(film, key).ravel() for film in played.values())
+    return np.concatenate([ERRORS_M.count(each[None]) for each in errors])
 
 
 def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
@@ -195,10 +204,10 @@ def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
         for name, above, below in (
             ("missed", missed, n), ("missed_far", far, away), ("recovered_far", back, far),
         ):  # fmt: skip
-            metrics[f"{name}.{column}.{motion}"] = estimate_ratio(above, below, "share")
+            metrics[f"{name}.{column}.{motion}"] = estimate_clustered_share(above, below)
     known = [_find_known(film) for film in films]
     lost, total = [(~each).sum() for each in known], [each.size for each in known]
-    return metrics | {f"missed.multi.{motion}": estimate_ratio(lost, total, "share")}
+    return metrics | {f"missed.multi.{motion}": estimate_clustered_share(lost, total)}
 
 
 def _count_joints(film: Film) -> Floats:

@@ -11,9 +11,9 @@ from hrc_env.experiments.report import Table
 
 TITLE = "Cost of perception at one rate of contacts"
 QUESTION = """\
-A perception setup that sees less needs more distance, and distance costs throughput. Every setup
-gets the shield margin with which the robot touches a worker while moving towards them {level:g}
-times in 1,000 episodes of 10 s, {hourly:.1f} times an hour; the remaining goals are compared. The
+How much throughput does a perception setup leave at one rate of contacts? Every setup gets the
+shield margin with which the robot touches a worker while moving towards them {hourly:.1f} times an
+hour ({level:g} times in 1,000 episodes of 10 s); the remaining goals are compared. The
 margin is added to all protective distances of the `{shield}` shield (`margin_m` and
 `hand_margin_m` of `ShieldConfig`) and may be negative, as the shield with its defaults is much
 safer than that. It is found by bisection on {n_seeds} episodes, the same for all setups, and
@@ -22,14 +22,24 @@ margin. Workers ignore {robot}; a contact is named by the robot's motion in the 
 touches within half a second of each other are one. Tasks with longer episodes have fewer of them;
 a thousand episodes always stand for the same time.
 
-This is one level, one shield and one body of the worker, and detections are emulated. The rates of
-other contacts are not equalized. With true joints the shield still has its own model of the body
-around them. At a stricter level, or with another shield, the order may differ."""
+This is one level and one shield, and detections are emulated. The rates of other contacts and the
+severity of contacts are not equalized. With true joints the shield still has its own model of the
+body around them. At a stricter level, or with another shield, the order may differ."""
 _ROW, _FRESH = "{0}.{1}.", "confirmed."
 """Prefixes of metrics: task and perception setup, and statistics of the confirming episodes."""
 PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "tested margin [m]", 4, plain=True)
+PER_HOUR = 60.0 / PER
+"""Factor from contacts in 1,000 episodes of 10 s to contacts per hour."""
 TOWARDS = Column(
-    f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [per 1,000]", 0, counted=True
+    f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [1/h]", 1, PER_HOUR, counted=True
+)
+SEVERE = Column(
+    f"{_ROW}{_FRESH}above_force_limit",
+    "contacts above the force limit at tested margin [%]",
+    0,
+    100,
+    counted=True,
+    shows="value of n",
 )
 LEFT = (
     Column(_ROW + "margin_m", "margin [m]", 3),
@@ -38,11 +48,13 @@ LEFT = (
     Column(_ROW + "of_truth", "throughput [% of true joints]", 0, 100),
 )
 """Columns of the metrics at the common rate of contacts."""
-COLUMNS = (*LEFT, PLAYED, TOWARDS)
+COLUMNS = (*LEFT, PLAYED, TOWARDS, SEVERE)
 """Columns of the tables in the documentation and in the report."""
 MORE = (
-    Column(f"{_ROW}{_FRESH}standing", "standing [per 1,000]", 0, counted=True),
-    Column(f"{_ROW}{_FRESH}away", "fleeing [per 1,000]", 0, counted=True),
+    Column(f"{_ROW}{_FRESH}standing", "standing [1/h]", 1, PER_HOUR, counted=True),
+    Column(f"{_ROW}{_FRESH}away", "fleeing [1/h]", 1, PER_HOUR, counted=True),
+    Column(f"{_ROW}{_FRESH}contacts", "contacts [1/h]", 1, PER_HOUR, counted=True),
+    Column(f"{_ROW}{_FRESH}interventions", "interventions [1/h]", 0, counted=True),
     Column(f"{_ROW}{_FRESH}goals_per_min", "goals at tested margin [1/min]"),
     Column(f"{_ROW}{_FRESH}cost", "true cost at tested margin"),
 )
@@ -72,14 +84,13 @@ WORTH = Table(
     (Column("worth.{}", "gain [%]", 1, 100.0, signed=True),),
     ("improvement",),
     "Throughput gained by the improvement at the same rate of contacts, in percentage points of "
-    "the throughput of an unshielded robot, on the same seeds. A dot marks an interval that "
-    "excludes zero; intervals are not corrected for the number of rows.",
+    "the throughput of an unshielded robot, on the same seeds. Intervals are those of single rows.",
 )
 
 
 def count_per_hour(level: float) -> float:
     """Convert a number of contacts in 1,000 episodes of 10 s to contacts per hour."""
-    return 60 * level / PER
+    return PER_HOUR * level
 
 
 def make_price_table(
@@ -102,14 +113,15 @@ def make_price_table(
     """
     return Table(
         "price",
-        f"Cost of perception at {level:g} contacts in 1,000 episodes",
+        f"Cost of perception at {count_per_hour(level):.1f} contacts towards per hour",
         {(task, each.name): (each.words,) for each in setups},
         (*COLUMNS, *more),
         ("perception",),
-        f"Goals that {robot} reaches beside workers of one body who ignore it, with emulated "
-        f"detections and the `{SHIELD}` shield. Each setup has the margin with which the robot "
-        f"touches a worker while moving towards them {level:g} times in 1,000 episodes of 10 s, "
-        f"that is {count_per_hour(level):.1f} times per hour; other contacts are not equalized. "
+        f"Goals that {robot} reaches beside workers who ignore it, with emulated detections and "
+        f"the `{SHIELD}` shield. Each setup has the margin with which the robot touches a worker "
+        f"while moving towards them {count_per_hour(level):.1f} times per hour; other contacts "
+        "and the severity of contacts are not equalized. Above the force limit: share of all "
+        "contacts, by the estimated force and the limit of the touched body region. "
         "The margin is added to all protective distances; 0 is the default shield, and negative "
         f"margins let the robot come closer. It is found on {n_seeds} episodes and corrected by "
         f"{{n[{task}.{setups[0].name}.margin_m]}} others, which are played with the tested margin. "
@@ -120,7 +132,7 @@ def make_price_table(
 def make_small_price_table(task: str) -> Table:
     """Return the table of an additional task, in which few setups are compared."""
     rows = {(task, name): (list_setups()[name].words,) for name in ELSEWHERE}
-    return Table("price_in", task, rows, (*LEFT, TOWARDS), ("perception",))
+    return Table("price_in", task, rows, (*LEFT, TOWARDS, SEVERE), ("perception",))
 
 
 def make_tasks_table(tasks: Sequence[str]) -> Table:
@@ -150,7 +162,7 @@ def _make_rate_columns(prefix: str) -> list[Column]:
             metric=prefix + column.metric.removeprefix(_ROW + _FRESH),
             heading=column.heading.replace(" at tested margin", ""),
         )
-        for column in (TOWARDS, *MORE)
+        for column in (TOWARDS, SEVERE, *MORE)
     ]
 
 

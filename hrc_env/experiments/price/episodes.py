@@ -18,6 +18,7 @@ from hrc_env.agents.env_info import Agent, env_info
 from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
+from hrc_env.evaluation.sums import ABOVE, ACTIVE, FORCE, INTERVENTIONS, RATED, SEVERITY
 from hrc_env.experiments.agents import describe_agent
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.price.setups import PriceSetup
@@ -37,10 +38,12 @@ CONTACTS = {
 }  # fmt: skip
 """Infos that count the contacts of the current episode, by the motion of the robot."""
 STEP = np.dtype([
-    *((name, float) for name in (*CONTACTS, "achieved", "cost")), ("over", bool),
+    *((name, float) for name in (*CONTACTS, "achieved", "cost", "severity", "force", "active")),
+    ("over", bool),
 ])  # fmt: skip
-"""Data type of the state of an episode after a step: counts since the start of the episode, cost of
-the step, and whether the episode has ended."""
+"""Data type of the state of an episode after a step: counts since the start of the episode; cost of
+the step; severity of a contact that begins, and its force over the limit of the touched region;
+whether the shield is active, NaN without a shield; and whether the episode has ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +149,8 @@ def run(
         for name, key in keys.items():
             step[name] = transition.info[key]
         step["cost"], step["over"] = transition.info["cost"], endless.terminated
+        step["severity"], step["force"] = transition.info[SEVERITY], transition.info[FORCE]
+        step["active"] = transition.info.get(ACTIVE, np.nan)
         joints = np.concatenate(list(map(read_true_joints, env.parts)))
         walks = [zlib.crc32(row, walk) for row, walk in zip(joints, walks, strict=True)]
         tick(1 / n_steps)
@@ -172,5 +177,10 @@ def sum_episodes(steps: NDArray[np.void], dt_s: float) -> Rows:
         "minutes": n_steps * dt_s / 60,
         **{name: last[name] for name in ("achieved", *CONTACTS)},
         "cost": (steps["cost"] * counts).sum(0),
+        RATED: ((steps["severity"] > 0) & counts).sum(0),
+        ABOVE: ((steps["force"] > 1.0) & counts).sum(0),
     }
+    if not np.isnan(steps["active"]).any():
+        begins = np.diff(steps["active"], axis=0, prepend=0.0) > 0
+        sums[INTERVENTIONS] = (begins & counts).sum(0)
     return {name: values.tolist() for name, values in sums.items()}

@@ -1,7 +1,7 @@
 """The price study: a search for margins that give all setups the same rate of contacts."""
 
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -30,10 +30,18 @@ from hrc_env.experiments.price.setups import (
     list_default_setups,
 )
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.report import (
+    SHIELD_CHOSEN_ON,
+    Conditions,
+    Metrics,
+    Report,
+    Table,
+    describe_quick_run,
+    format_seeds,
+)
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import check_at_least_one, override
-from hrc_env.experiments.stage import PEOPLE, Rows
+from hrc_env.experiments.stage import PEOPLE, WORKER, Rows
 from hrc_env.experiments.versions import hash_source, make_key
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
@@ -164,7 +172,8 @@ class Price:
     def settings(self) -> dict[str, Any]:
         """Return the settings on which all numbers depend."""
         given = {name: each for name, each in asdict(self).items() if name != "driver"}
-        return {"people": PEOPLE, "shield": SHIELD, **given, **self.driver.settings()}
+        given |= {"people": PEOPLE, "worker": WORKER, "shield": SHIELD}
+        return {**given, **self.driver.settings()}
 
     def play(self, cache: PartCache) -> Played:
         """Run all searches and return their results."""
@@ -186,7 +195,31 @@ class Price:
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
         others = (declaration.make_tasks_table(self.tasks),) if self.others else ()
-        return (self.make_price_table(), declaration.WORTH, *others)
+        tables = (declaration.WORTH, *others)
+        conditions = self.conditions
+        return (
+            self.make_price_table(),
+            *(replace(table, conditions=conditions) for table in tables),
+        )
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of the episodes that confirm margins."""
+        scenes = dict.fromkeys(f"`{find_task(task).scene}`" for task in self.tasks)
+        searched = format_seeds(self.list_seeds(self.task, self.n_seeds))
+        return Conditions(
+            people=f"`{PEOPLE}`", scene=" or ".join(scenes),
+            perception="`keypoints`, and `truth` for true joints",
+            seeds=format_seeds(self.list_seeds(self.task, self.n_fresh, FIRST_FRESH)),
+            chosen_on=f"margins were chosen on {searched}; {SHIELD_CHOSEN_ON}",
+            worker=WORKER,
+        )  # fmt: skip
+
+    @property
+    def image_conditions(self) -> Conditions:
+        """The conditions of the episodes with rendered images and of those beside them."""
+        seeds = range(FIRST_PIXELS, FIRST_PIXELS + max(self.n_pixels, 1))
+        return replace(self.conditions, perception="in the rows", seeds=format_seeds(seeds))
 
     def make_price_table(self, more: Sequence[Column] = ()) -> Table:
         """Return the table of all perception setups.
@@ -194,9 +227,10 @@ class Price:
         Args:
             more: columns in addition to those of the documentation.
         """
-        return declaration.make_price_table(
+        table = declaration.make_price_table(
             self.task, find_setups(self.setups), self.driver.words, self.n_seeds, self.level, more
         )
+        return replace(table, conditions=self.conditions)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure and return the report."""
@@ -331,7 +365,7 @@ def _make_part(
     played = {name: each for name, each in asdict(setup).items() if name not in ("words", "group")}
     n_steps, driver = config.count_steps(task), config.driver
     made_of = {
-        "people": PEOPLE, "task": task, "seeds": seeds, "n_steps": n_steps,
+        "people": PEOPLE, "worker": WORKER, "task": task, "seeds": seeds, "n_steps": n_steps,
         "setup": played, "margin_m": margin_m, "shield": SHIELD if is_shielded else "",
         "estimator": hash_source(find_estimator(setup.perception.estimator).make),
         **driver.settings(),

@@ -13,20 +13,27 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import (
+    MIN_SEEDS,
+    P,
+    adjust_metrics,
+    estimate_burst_rate,
     estimate_goal_rate,
     estimate_rate,
     estimate_ratio,
+    estimate_share_of,
     find_crossing,
+    make_percentile_metric,
 )
-from hrc_env.evaluation.sums import COST_UNIT
+from hrc_env.evaluation.sums import ABOVE, COST_UNIT, INTERVENTIONS, RATED
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.search import MarginSearch, draw_seeds, fit_falling_rates
 from hrc_env.experiments.price.setups import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.report import Metrics
 from hrc_env.experiments.stage import Rows
 
-N_DRAWS = 1000
-"""Number of bootstrap draws."""
+N_DRAWS = 2000
+"""Number of bootstrap draws. The smallest p-value of a contrast is 1 / 1000, which remains below
+.05 if it is adjusted for 16 contrasts."""
 EPISODE_MIN = 10.0 / 60.0
 """Duration of the episodes in `UNIT` [min], which does not depend on the task."""
 PER = 1000 * EPISODE_MIN
@@ -154,13 +161,21 @@ def compute_metrics(played: Played, level: float) -> dict[str, Metric]:
         metrics |= {f"{task}.{key}": metric for key, metric in of_task.items()}
         if task == next(iter(played.table)):
             metrics |= _measure_contrasts(shares, n)
-    return metrics
+    return metrics | adjust_metrics(metrics)
 
 
 def _measure_rates(rows: Rows) -> Metrics:
     """Return the rates of contacts and goals and the cost of episodes, with their intervals."""
     per = np.array(rows["minutes"]) / PER
-    contacts = {kind: estimate_rate(rows[kind], per, UNIT) for kind in CONTACTS}
+    every = np.sum([rows[kind] for kind in CONTACTS], axis=0)
+    contacts = {
+        **{kind: estimate_rate(rows[kind], per, UNIT) for kind in CONTACTS},
+        "contacts": estimate_rate(every, per, UNIT),
+        "above_force_limit": estimate_share_of(rows[ABOVE], rows[RATED]),
+    }
+    if INTERVENTIONS in rows:
+        hours = np.array(rows["minutes"]) / 60
+        contacts[INTERVENTIONS] = estimate_burst_rate(rows[INTERVENTIONS], hours, "1/h")
     return {
         **contacts,
         "goals_per_min": estimate_goal_rate(rows["achieved"], rows["minutes"]),
@@ -186,7 +201,7 @@ def _measure_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -
         "goals_per_min": _make_metric(drawn[:, 1], "1/min", n),
         "share": _make_metric(share, "share", n),
         **of_truth,
-        "confirmed.margin_m": Metric(margin_m, margin_m, margin_m, "m", n),
+        "confirmed.margin_m": Metric(margin_m, margin_m, margin_m, "m", 1),
         **{f"confirmed.{key}": metric for key, metric in _measure_rates(row.fresh).items()},
     }
 
@@ -204,12 +219,28 @@ def _divide(above: Floats, below: Floats) -> Floats:
 
 
 def _measure_contrasts(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
-    """Return the differences of all `CONTRASTS` for which both setups were played."""
-    return {
-        f"worth.{name}": _make_metric(shares[pair.better] - shares[pair.worse], "share", n)
-        for name, pair in CONTRASTS.items()
-        if pair.better in shares and pair.worse in shares
-    }
+    """Return the differences of all `CONTRASTS` that were played, and their p-values.
+
+    A p-value is twice the fraction of bootstrap draws on the other side of zero (Davison and
+    Hinkley 1997, Bootstrap Methods and their Application, ch. 4).
+    """
+    metrics: dict[str, Metric] = {}
+    for name, pair in CONTRASTS.items():
+        if pair.better in shares and pair.worse in shares:
+            drawn = shares[pair.better] - shares[pair.worse]
+            p = _test_difference(drawn[1:]) if n >= MIN_SEEDS else np.nan
+            metrics[f"worth.{name}"] = _make_metric(drawn, "share", n)
+            metrics[f"{P}worth.{name}"] = Metric(p, p, p, "p", n)
+    return metrics
+
+
+def _test_difference(drawn: Floats) -> float:
+    """Return the two-sided p-value of a difference from its bootstrap draws (R,)."""
+    known: Floats = drawn[np.isfinite(drawn)]
+    if not known.size:
+        return np.nan
+    n_other = min(int((known <= 0).sum()), int((known >= 0).sum()))
+    return min(2 * (1 + n_other) / (1 + known.size), 1.0)
 
 
 def _measure_ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
@@ -232,7 +263,5 @@ def _measure_ranking(shares: Mapping[str, Floats], n: int) -> dict[str, Metric]:
 def _make_metric(drawn: Floats, unit: str, n: int) -> Metric:
     """Return the first draw with the 95 % interval of the others, or NaN if it is not finite."""
     known: Any = drawn[1:][np.isfinite(drawn[1:])]
-    if not (np.isfinite(drawn[0]) and known.size):
-        return Metric(np.nan, np.nan, np.nan, unit, n)
-    low, high = np.quantile(known, [0.025, 0.975])
-    return Metric(float(drawn[0]), float(low), float(high), unit, n)
+    point = float(drawn[0]) if np.isfinite(drawn[0]) and known.size else np.nan
+    return make_percentile_metric(point, known, unit, n)

@@ -1,9 +1,11 @@
 """The report of the price study: bar chart of throughput, margins and contrasts."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from hrc_env.core.results import Metric
@@ -13,7 +15,7 @@ from hrc_env.experiments.price.declaration import MORE, count_per_hour
 from hrc_env.experiments.price.metrics import Played, Row
 from hrc_env.experiments.price.setups import FOUR, GROUPS, QUICK, PriceSetup, list_setups
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.report import Metrics, Report, format_picture
+from hrc_env.experiments.report import Metrics, Report, Table, format_picture
 
 if TYPE_CHECKING:
     from hrc_env.experiments.price.experiment import Price
@@ -36,25 +38,29 @@ def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics
     """
     task, table = config.task, played.table
     setups = [list_setups()[name] for name in table[task]]
+
+    def state(table: Table) -> str:
+        return replace(table, conditions=config.conditions).to_markdown(metrics)
+
     draw_price(figures / "price.png", metrics, task, setups, config.level)
     parts = [
         format_picture(figures / "price.png", "Goals that remain at that rate of contacts, in "
                        "percent of a robot's without a shield; whiskers are 95 % intervals."),
         config.make_price_table(MORE).to_markdown(metrics),
-        declaration.make_unshielded_table(task).to_markdown(metrics),
+        state(declaration.make_unshielded_table(task)),
         _describe_open_ends(task, table[task], metrics),
-        declaration.WORTH.to_markdown(metrics),
+        state(declaration.WORTH),
     ]  # fmt: skip
     if config.others:
         tasks_table = declaration.make_tasks_table(config.tasks)
-        parts += ["## Other tasks", tasks_table.to_markdown(metrics)]
+        parts += ["## Other tasks", state(tasks_table)]
         tables = map(declaration.make_small_price_table, config.others)
-        parts += [table.to_markdown(metrics) for table in tables]
+        parts += map(state, tables)
     if played.pixels:
         parts += [
             f"## Emulator and rendered images\n\n{config.n_pixels} episodes with the margin of "
             f"`{FOUR}`; the same for both, and too few for a bar.",
-            declaration.IMAGES.to_markdown(metrics),
+            replace(declaration.IMAGES, conditions=config.image_conditions).to_markdown(metrics),
         ]
     question = declaration.QUESTION.format(
         level=config.level, hourly=count_per_hour(config.level), shield=SHIELD,
@@ -118,7 +124,7 @@ def draw_price(
     figure.legend(bars, words, loc="outside lower center", ncols=2, fontsize=10)
     figure.suptitle(
         f"Throughput at {count_per_hour(level):.1f} contacts towards the worker per hour\n"
-        "emulated detections, one body, margin of one shield", fontsize=13,
+        "emulated detections, margin of one shield", fontsize=13,
     )  # fmt: skip
     save(figure, path)
 
@@ -131,7 +137,7 @@ def _label_bars(axis: Axes, shown: Sequence[PriceSetup], values: Sequence[Metric
             axis.text(1.2, y, f"{100 * value.value:.0f} %", va="center", color="white",
                       fontsize=12, fontweight="bold")  # fmt: skip
     label_axes(axis, "throughput in % of a robot without a shield", grid="x")
-    axis.set_xlim(0, max([100.0, *(100 * value.high for value in values)]))
+    axis.set_xlim(0, np.nanmax([100.0, *(100 * value.high for value in values)]))
     for side in ("top", "right", "left"):
         axis.spines[side].set_visible(False)
     axis.tick_params(axis="y", length=0)

@@ -15,7 +15,14 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.evaluation.intervals import compare_paired, estimate_mean, estimate_rmse, make_rmse
+from hrc_env.evaluation.intervals import (
+    MIN_SEEDS,
+    adjust_metrics,
+    compare_paired,
+    estimate_clustered_share,
+    estimate_rmse,
+    make_rmse,
+)
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
 from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
@@ -87,7 +94,7 @@ class Site:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a quick run; "" for other runs."""
-        is_short = is_as_short(self, QUICK)
+        is_short = is_as_short(self, QUICK) or self.n_seeds < MIN_SEEDS
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
@@ -204,8 +211,10 @@ def compute_metrics(config: Site, played: Played) -> dict[str, Metric]:
         for key in (f"{name}.{row}", f"{ALONE}{name}.{row}"):
             if key in squared:
                 metrics[f"rmse_m.{key}"] = estimate_rmse(squared[key], n_judged, "m")
-                tracked = [float(np.mean(film["rows"][key]["tracked"])) for film in films.values()]
-                metrics[f"tracked.{key}"] = estimate_mean(tracked, "share")
+                tracked = [film["rows"][key]["tracked"] for film in films.values()]
+                metrics[f"tracked.{key}"] = estimate_clustered_share(
+                    [sum(frames) for frames in tracked], [len(frames) for frames in tracked]
+                )
         if row != MULTI:
             one, multi = (squared[f"{name}.{cameras}"] for cameras in (row, MULTI))
             metrics[f"over_multi.{name}.{row}"] = estimate_rmse(one, multi, "ratio")
@@ -220,7 +229,7 @@ def compute_metrics(config: Site, played: Played) -> dict[str, Metric]:
         squares = [_square_m2(films[seed], row) for seed, row in walks.items()]
         sums, counts = [errors.sum() for errors in squares], [len(errors) for errors in squares]
         metrics[f"closed_rmse_m.{key}"] = estimate_rmse(sums, counts, "m")
-    return metrics
+    return metrics | adjust_metrics(metrics)
 
 
 def _square_m2(film: Walk, row: Walk) -> Floats:
