@@ -163,7 +163,7 @@ def write_entry(path: Path, entry: Entry) -> None:
 def shorten(scores: Scores) -> dict[str, Metric]:
     """Return the metrics that an entry contains, with as many digits as it contains."""
     return {
-        name: Metric(*(float(f"{each:.5g}") for each in (m.value, m.low, m.high)), "", m.n)
+        name: Metric(_round(m.value), _round(m.low), _round(m.high), "", m.n)
         for name, m in scores.items()
         if name.rsplit(".", 1)[1] in METRICS
     }
@@ -331,6 +331,10 @@ def _describe_libraries(entry: Entry) -> str:
     differing = [f"{name} {theirs.get(name)} there and {each} here"
                  for name, each in ours.items() if theirs.get(name) != each]  # fmt: skip
     return f" Libraries differ, too: {', '.join(differing)}." if differing else ""
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.5g}")
 
 
 def _show(metric: Metric | None) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from hrc_env.__main__ import main
+from hrc_env.agents.separate import SeparateProcess
 from hrc_env.experiments.entries import read_entry
 from hrc_env.experiments.leaderboard import CONDITIONS, MAIN, SEED, draw_first_seed, make_plan
 from hrc_env.safety.incidents import KINDS
@@ -68,7 +69,8 @@ def test_seeds_follow_from_the_digest_and_the_salt():
     assert plan.make_study().first_seed == SEED
     salted = replace(plan, salt="drawn later").make_study()
     assert salted.first_seed == draw_first_seed(plan.submission.sha256, "drawn later")
-    assert all(row.agent.must_confine for row in salted.rows.values())
+    agents = [row.agent for row in salted.rows.values()]
+    assert all(isinstance(each, SeparateProcess) and each.must_confine for each in agents)
     seeds = {draw_first_seed(sha, salt) for sha in ("a", "b") for salt in ("c", "d")}
     assert len(seeds) == 4
     assert max(seeds) > 10**9  # too many to try all
