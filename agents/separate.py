@@ -6,9 +6,10 @@ every action that it receives, and executes and unpickles nothing of it. On Linu
 also read only Python's libraries, this package and copies of the policy's files, and can write only
 to a temporary folder (`confinement`). It computes on the CPU.
 
-Not prevented: a policy can use time up to `ANSWER_S`, memory and disk space; it can see which files
-exist; it can use UDP and named sockets; and without Landlock, it can read and change the files and
-processes of its user.
+Not prevented: a policy can use time up to `ANSWER_S`, memory and disk space, and leave processes
+behind; it can see which files exist, and change their permissions and times; it can use UDP and
+named sockets, and the rights of root if the judging process has them. Without Landlock, it can read
+and change the files and processes of its user.
 """
 
 import os
@@ -57,8 +58,11 @@ KEPT = ("PATH", "LANG", "TZ", "LD_LIBRARY_PATH", "HRC_ENV_CORES")
 KEPT_BEGINNINGS = ("LC_", "OMP_", "OPENBLAS_", "MKL_", "NUMBA_")
 """Environment variables that a policy's process receives, and beginnings of others. They determine
 how numbers are computed; others may be secret."""
-SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc", "/sys/devices/system", "/dev/urandom",
-          "/dev/random", "/dev/zero", "/proc/self", "/proc/cpuinfo", "/proc/meminfo")  # fmt: skip
+SYSTEM = (
+    "/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/localtime", "/etc/passwd",
+    "/sys/devices/system", "/dev/urandom", "/dev/random", "/dev/zero", "/proc/self",
+    "/proc/cpuinfo", "/proc/meminfo",
+)  # fmt: skip
 """Files of the system that a policy may read."""
 END_S = 5.0
 """Time in which a process ends that has closed its connection [s]."""

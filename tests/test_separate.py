@@ -127,8 +127,8 @@ def test_the_process_has_no_object_of_the_judge(ask):
 @needs_landlock
 @pytest.mark.parametrize(
     "name",
-    ["Reader", "Lister", "Writer", "Adder", "Remover", "Spawner", "MemoryReader", "ArgumentReader",
-     "Tracer", "PackageWriter"],
+    ["Reader", "Lister", "Writer", "Adder", "Remover", "Spawner", "LinkReader", "RootReader",
+     "MemoryReader", "MemoryCaller", "ArgumentReader", "Tracer", "PackageWriter"],
 )  # fmt: skip
 def test_the_process_reaches_no_file_and_no_memory_of_the_judge(name, ask, folder):
     assert not ask(name).any()
@@ -247,8 +247,11 @@ def test_reading_a_policy_runs_nothing_of_it(folder):
         read_submission("nowhere:make")
 
 
-def test_a_policy_sees_its_own_files_only(folder, env_info):
+@pytest.mark.parametrize("version", [0, None], ids=["without Landlock", "with Landlock"])
+def test_a_policy_sees_its_own_files_only(version, folder, env_info, monkeypatch):
     """A digest of one file says nothing of another one that it imports."""
+    if version is not None:
+        monkeypatch.setattr(confinement, "find_version", lambda: version)
     Path("alone.py").write_text("from cheats import Reporter as make\n")
     with pytest.raises(AgentError, match="No module named 'cheats'"):
         apart("alone:make")(env_info)

@@ -140,6 +140,39 @@ class Spawner(Reporter):
         return subprocess.run(["/bin/cat", SECRET], check=False).returncode == 0
 
 
+class LinkReader(Reporter):
+    """Reads by a link from the folder that it may write to."""
+
+    def succeeds(self):
+        link = Path("link")
+        if not link.is_symlink():
+            link.symlink_to(SECRET)
+        return attempt(link.read_text)
+
+
+class RootReader(Reporter):
+    """Reads by another path to the root of the file system."""
+
+    def succeeds(self):
+        return attempt(Path(f"/proc/self/root{SECRET}").read_text)
+
+
+class MemoryCaller(Reporter):
+    """Reads the memory of the judging process by a system call, at the address of libc's data."""
+
+    def succeeds(self):
+        import ctypes
+
+        class Span(ctypes.Structure):
+            _fields_ = (("base", ctypes.c_void_p), ("length", ctypes.c_size_t))
+
+        here, there = ctypes.create_string_buffer(8), Span(1, 8)
+        spans = ctypes.byref(Span(ctypes.addressof(here), 8)), 1, ctypes.byref(there), 1
+        libc = ctypes.CDLL(None, use_errno=True)
+        libc.process_vm_readv(os.getppid(), *spans, 0)
+        return ctypes.get_errno() != 1  # EPERM; EFAULT if only the address is wrong
+
+
 class MemoryReader(Reporter):
     def succeeds(self):
         return attempt(Path(f"/proc/{os.getppid()}/mem").open)
