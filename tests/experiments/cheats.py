@@ -183,13 +183,17 @@ class ArgumentReader(Reporter):
         return attempt(Path(f"/proc/{os.getppid()}/cmdline").read_bytes)
 
 
+SEIZE = 0x4206
+"""PTRACE_SEIZE."""
+
+
 class Tracer(Reporter):
-    """Attaches to the judging process as a debugger."""
+    """Attaches to the judging process as a debugger, without stopping it."""
 
     def succeeds(self):
         import ctypes
 
-        return ctypes.CDLL(None).ptrace(16, os.getppid(), None, None) == 0
+        return ctypes.CDLL(None).ptrace(SEIZE, os.getppid(), None, None) == 0
 
 
 class PackageWriter(Reporter):
