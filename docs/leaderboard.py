@@ -40,7 +40,8 @@ contact: the upper end is 20.8 per hour after 64 episodes of 10 s, and 1.3 after
 - *judged*: played by the maintainers on seeds that were unknown when the policy was submitted. They
   follow from the SHA-256 digest of the policy's files and from a salt that was drawn afterwards.
 - *public seeds*: as submitted. The seeds are known, and a policy may have been chosen for them.
-- *no digest*: as submitted, by a former version of the package. It cannot be replayed.
+- *no digest*: as submitted, by a former version of the package. It cannot be replayed, and the
+  environments have changed since.
 
 The policy acts in a process of its own, which receives observations, and what an agent knows in
 advance (`EnvInfo`). Its actions are checked; nothing else that it sends is used. On Linux (5.13 or

@@ -137,10 +137,11 @@ def read_entry(path: Path) -> Entry:
                 f"{path} is of version {version} of the benchmark, but this is version {VERSION}: "
                 "their numbers are not comparable. Run python -m hrc_env benchmark again."
             )
-        metrics = {key: Metric(v, low, high, "", n) for key, (v, low, high, n) in scores.items()}
+        metrics = {key: _read_metric(*numbers) for key, numbers in scores.items()}
+        policy, commit, date = (str(content[name]) for name in ("policy", "commit", "date"))
         setup = content.get("setup")
-        entry = Entry(content["policy"], content["commit"], content["date"], metrics,
-                      None if setup is None else from_mapping(Setup, setup, "setup."))  # fmt: skip
+        known = None if setup is None else from_mapping(Setup, setup, "setup.")
+        entry = Entry(policy, commit, date, metrics, known)
     except OSError as error:
         raise ConfigError(f"The entry {path} cannot be read: {error.strerror}.") from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
@@ -331,6 +332,10 @@ def _describe_libraries(entry: Entry) -> str:
     differing = [f"{name} {theirs.get(name)} there and {each} here"
                  for name, each in ours.items() if theirs.get(name) != each]  # fmt: skip
     return f" Libraries differ, too: {', '.join(differing)}." if differing else ""
+
+
+def _read_metric(value: Any, low: Any, high: Any, n: Any) -> Metric:
+    return Metric(float(value), float(low), float(high), "", int(n))
 
 
 def _round(value: float) -> float:

@@ -95,7 +95,14 @@ def test_an_entry_of_another_version_is_refused(bare):
         read_entry(bare)
 
 
-@pytest.mark.parametrize("text", ["{}", "[]", "no JSON", '{"version": 1, "scores": [1]}'])
+FEW = '{"version": 1, "policy": "a", "commit": "b", "date": "c", "scores": {"d": %s}}'
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{}", "[]", "no JSON", '{"version": 1, "scores": [1]}', FEW % "[1, 2, 3]", FEW % "3",
+     FEW % '["much", 1, 2, 3]'],
+)  # fmt: skip
 def test_a_file_that_is_no_entry_is_refused(text, bare):
     bare.write_text(text)
     with pytest.raises(ConfigError, match="is not a result of the benchmark"):
