@@ -8,6 +8,7 @@ The process contains no environment. Its working directory holds the policy's fi
 import pickle
 import socket
 import sys
+import traceback
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from hrc_env.agents.messages import (
     send,
 )
 from hrc_env.agents.registry import make_agent
+from hrc_env.core.errors import HRCError
 
 MOST_CHARACTERS = 2000
 """Maximum length of the text of an error that is sent."""
@@ -40,6 +42,8 @@ def serve(judge: socket.socket) -> None:
     except EndedError:
         return
     except Exception as error:  # of the policy; the judging process shows it
+        if not isinstance(error, HRCError):
+            traceback.print_exc()
         text = f"{type(error).__name__}: {error}"
         send(judge, {"error": text[:MOST_CHARACTERS]})
 
