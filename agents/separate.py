@@ -50,10 +50,11 @@ from .messages import (
 )
 from .submission import Submission
 
-START_S = 300.0
+START_S = 600.0
 """Time in which a policy's process must start and make its agent [s]."""
-ANSWER_S = 60.0
-"""Time in which a policy must answer an observation or a batch of observations [s]."""
+ANSWER_S = 600.0
+"""Time in which a policy must answer an observation or a batch of observations [s]. It only ends
+policies that hang: with 60 s, a scripted policy was late once on a machine with 12 other loads."""
 KEPT = ("PATH", "LANG", "TZ", "LD_LIBRARY_PATH", "HRC_ENV_CORES")
 KEPT_BEGINNINGS = ("LC_", "OMP_", "OPENBLAS_", "MKL_", "NUMBA_")
 """Environment variables that a policy's process receives, and beginnings of others. They determine
