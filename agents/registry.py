@@ -48,7 +48,7 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
         return experts.make_expert(env_info, Yielding() if name != "scripted" else None)
     if is_policy(name):
         return policies.load(policies.find_path(name), env_info)
-    if _is_checkpoint(name):
+    if is_checkpoint(name):
         from . import acting  # here: torch is optional and slow to import
 
         return acting.load(Path(name), env_info, trust)
@@ -72,7 +72,7 @@ def check_agent(name: str) -> None:
         inside = Path(name) / "policy.zip"
         hint = f" Did you mean {str(inside)!r}?" if inside.is_file() else ""
         raise ConfigError(f"The agent {name!r} is a folder.{hint} {_list_valid()}")
-    if _is_checkpoint(name):
+    if is_checkpoint(name):
         return
     if ":" in name:
         find_function(name)
@@ -90,7 +90,7 @@ def find_control(name: str) -> str | None:
     check_agent(name)
     if is_policy(name):
         return policies.read(policies.find_path(name)).card.control
-    if not _is_checkpoint(name):
+    if not is_checkpoint(name):
         return None
     from . import acting
 
@@ -118,7 +118,8 @@ def _list_valid() -> str:
     return f"Valid: {', '.join(map(repr, AGENTS))}. Or {OTHERS}."
 
 
-def _is_checkpoint(name: str) -> bool:
+def is_checkpoint(name: str) -> bool:
+    """Return whether an agent's name is the path of a checkpoint (.zip) or of another file."""
     return bool(name) and (Path(name).suffix == ".zip" or Path(name).is_file())
 
 

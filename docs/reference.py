@@ -11,6 +11,7 @@ from typing import Any, get_args, get_origin
 
 import gymnasium
 import numpy as np
+import tyro
 
 from assets.emulator.calibrate import CalibrateKeypoints
 from assets.error_bounds.calibrate import LEVEL
@@ -801,8 +802,15 @@ def _options(kind: type, but: type | None = None) -> str:
     for field in dataclasses.fields(kind):
         if field.name in known and known[field.name] == field.default:
             continue
-        flag = f"`--{field.name.replace('_', '-')}`"
-        rows.append((flag, _default(field), docs.get(field.name, "")))
+        name = field.name.replace("_", "-")
+        is_word = tyro.conf.Positional in getattr(field.type, "__metadata__", ())
+        rows.append(
+            (
+                f"`{name.upper()}`" if is_word else f"`--{name}`",
+                _default(field),
+                docs.get(field.name, ""),
+            )
+        )
     return _table(("option", "default", "meaning"), rows) if rows else ""
 
 

@@ -61,6 +61,10 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "hrc_env.cli.benchmark", "Benchmark",
         "Evaluate a policy on fixed seeds in the setups of the benchmark.",
     ),
+    "judge": (
+        "hrc_env.cli.benchmark", "Judge",
+        "Judge an entry of the leaderboard on fresh seeds.",
+    ),
     "import-motion": (
         "hrc_env.cli.import_motion", "ImportMotion",
         "Convert a motion-capture recording (BVH, ASF/AMC or npz) into a clip that workers play.",

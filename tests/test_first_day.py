@@ -36,10 +36,10 @@ def said_by(capsys, *words):
 
 def test_the_benchmark_takes_tasks_of_users(monkeypatch):
     monkeypatch.setitem(TASKS, "Hover-v0", vary(REACH, id="Hover-v0"))
-    study = leaderboard.make_study("scripted", ["Hover-v0"], n_seeds=1)
+    study = leaderboard.make_plan("scripted", ["Hover-v0"], n=1).make_study()
     assert {row.env["task"] for row in study.rows.values()} == {"Hover-v0"}
     with pytest.raises(hrc_env.ConfigError, match=r"Unknown task 'Hver-v0'.*--import FILE"):
-        leaderboard.make_study("scripted", ["Hver-v0"])
+        leaderboard.make_plan("scripted", ["Hver-v0"]).make_study()
 
 
 def test_only_tasks_of_the_package_enter_the_leaderboard(monkeypatch, capsys, tmp_path):

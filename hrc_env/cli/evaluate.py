@@ -1,7 +1,7 @@
 """Evaluate an agent over many episodes, on one machine or on a cluster."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +12,7 @@ from rich.console import Console
 import hrc_env
 from hrc_env.cli.checks import check_at_least, check_writable_file
 from hrc_env.cli.engines import EngineArguments
-from hrc_env.core.errors import check_names
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.progress import Meter
 from hrc_env.env_words import EnvironmentArguments
 from hrc_env.tasks import DEFAULT
@@ -24,7 +24,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
 
     Episodes are played on one machine or on a cluster. The seed of the first episode is --seed, and
     it increases by one with each further episode. The k-th episode is the same for every agent and
-    engine.
+    engine. With --verify, an entry of the leaderboard is replayed instead.
     """
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
@@ -42,11 +42,19 @@ class Evaluate(EnvironmentArguments, EngineArguments):
     """Seed of the first episode."""
     perception: str = "keypoints"
     """Perception level: keypoints (camera emulator), pixels, truth or none."""
+    separate: bool = False
+    """Let the agent act in a process of its own, which receives only observations and, on Linux,
+    reads no other files than its own. The score is the same."""
     out: Path | None = None
     """JSON file to which the score, agent, seed and environment are also written."""
+    verify: Path | None = None
+    """Entry of the leaderboard (JSON) to replay: every number must be equal. The entry contains all
+    settings; other options than those of the engine are not accepted."""
 
     def run(self) -> int:
         """Play the episodes and print the score; return the exit status."""
+        if self.verify is not None:
+            return self._verify(self.verify)
         check_names("environment", [self.task], hrc_env.IDS)
         check_at_least("--episodes", self.episodes, 1)
         check_at_least("--seed", self.seed, 0)
@@ -63,10 +71,18 @@ class Evaluate(EnvironmentArguments, EngineArguments):
         from hrc_env.evaluation.episodes import describe_contradiction, evaluate
         from hrc_env.pipeline.ready import make_ready
 
-        check_agent(self.agent)
-        make = partial(make_agent, carried(self.agent), trust=self.trust)
+        if self.separate:
+            from hrc_env.agents.separate import SeparateProcess
+            from hrc_env.agents.submission import read_submission
+
+            submission = read_submission(self.agent)
+            make, control = SeparateProcess(submission, self.trust), submission.control
+        else:
+            check_agent(self.agent)
+            make = partial(make_agent, carried(self.agent), trust=self.trust)
+            control = find_control(self.agent)
         make_ready(console, self.perception)
-        keywords = replace(self, control=self.control or find_control(self.agent)).keywords()
+        keywords = replace(self, control=self.control or control).keywords()
         with Meter(console, "episodes", self.episodes, "episodes") as meter:
 
             def tick(share: float) -> None:
@@ -83,4 +99,30 @@ class Evaluate(EnvironmentArguments, EngineArguments):
             content = {"score": scores, **setup, **provenance()}
             write_whole(self.out, json.dumps(content, indent=1))
             console.print(f"In {self.out}", highlight=False, soft_wrap=True)
+        return 0
+
+    def _verify(self, path: Path) -> int:
+        """Replay an entry of the leaderboard; return the exit status.
+
+        Raises:
+            ConfigError: an option contradicts the entry, or the entry cannot be replayed.
+            HRCError: a number of the replay differs.
+        """
+        usual = type(self)(verify=path, engine=self.engine, workers=self.workers,
+                           address=self.address)  # fmt: skip
+        differing = [each.name for each in fields(self)
+                     if getattr(self, each.name) != getattr(usual, each.name)]  # fmt: skip
+        if differing:
+            raise ConfigError(
+                f"--verify takes all settings from the entry: leave out {', '.join(differing)}."
+            )
+        engine = self.choose_engine()
+        from hrc_env.cli.benchmark import SHOWN, play_plan
+        from hrc_env.experiments import entries
+
+        plan = entries.plan_replay(path)
+        out = Path("out/verify") / f"{path.stem}-{plan.submission.sha256[:SHOWN]}"
+        play_plan(plan, out, engine, overwrite=True, enter=None)
+        n = entries.check_replay(path, entries.read_scores(out / "results.json"))
+        print(f"Verified: {n} numbers of {path} are equal.")
         return 0

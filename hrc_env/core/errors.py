@@ -8,6 +8,7 @@
     │   └── WeightsError       weights of the pose network
     ├── RenderingError         no OpenGL context
     ├── CheckpointError        a saved agent that does not fit its environment
+    ├── AgentError             an agent in a process of its own that fails
     └── MissingExtraError      libraries of an extra that is not installed
 
 A worker out of sight is reported as data (a growing covariance, a flag), never as an error.
@@ -55,6 +56,10 @@ class RenderingError(HRCError, RuntimeError):
 
 class CheckpointError(HRCError, RuntimeError):
     """A saved agent does not fit the environment for which it is loaded."""
+
+
+class AgentError(HRCError, RuntimeError):
+    """The process of an agent ended, does not answer, or returned invalid actions."""
 
 
 class MissingExtraError(HRCError, ImportError):

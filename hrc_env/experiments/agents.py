@@ -9,6 +9,7 @@ from typing import Any
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import AgentFactory
 from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, find_function, make_agent
+from hrc_env.agents.separate import SeparateProcess
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.experiments.versions import hash_file, hash_source
 
@@ -37,8 +38,11 @@ def describe_agent(agent: AgentChoice) -> Any:
     """Return a description of an agent for the cache keys of a study's parts, as JSON values.
 
     It is the agent's name or the digest of its file. For a user's function, it is the name of the
-    function and the digest of its source file.
+    function and the digest of its source file; for an agent in a process of its own, the policy and
+    the digest of its files.
     """
+    if isinstance(agent, SeparateProcess):
+        return {"separate": agent.submission.policy, "sha256": agent.submission.sha256}
     if not isinstance(agent, str):
         name = getattr(agent, "__qualname__", type(agent).__qualname__)
         return {"function": name, "source": hash_source(agent)}

@@ -1,15 +1,15 @@
-"""The benchmark of policies with fixed conditions and seeds, and the entries of the leaderboard."""
+"""The benchmark of policies: conditions and seeds.
 
-import datetime
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import Any
+A policy acts in a process of its own (`hrc_env.agents.separate`). Its seeds are public, or follow
+from its digest and a salt that is drawn after the policy was submitted.
+"""
 
-from hrc_env.agents.registry import find_control
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric, provenance, write_whole
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hrc_env.agents.separate import SeparateProcess
+from hrc_env.agents.submission import Submission, read_submission
 from hrc_env.evaluation.sums import ACHIEVED
 from hrc_env.experiments.columns import per_minute, rate, share_of_tries
 from hrc_env.experiments.report import Table
@@ -22,7 +22,11 @@ from hrc_env.tasks.task import find_task
 VERSION = 1
 """Version of the conditions, seeds and counts. Numbers of different versions cannot be compared."""
 SEED = 5_000_000
-"""Seed of the first episode, far from those of training and of other evaluations."""
+"""Public seed of the first episode, far from those of training and of other evaluations."""
+SALTED_BYTES = 6
+"""Size of the first seed that follows from a salt [bytes]."""
+DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
+"""Subsystems on which the numbers depend (`behaviour.toml`)."""
 SETUPS = {
     "truth": ("the truth", PerceptionSetup("truth")),
     "keypoints": ("four cameras", PerceptionSetup()),
@@ -89,117 +93,84 @@ MAIN = (Condition().name, Condition(shield="qp").name)
 """Names of the conditions that the leaderboard shows."""
 
 
-def make_study(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A run of the benchmark: policy, environments and episodes."""
+
+    submission: Submission
+    """The policy with its files."""
+    ids: Sequence[str] = tuple(BUILT_IN)
+    """Ids of the environments; a learnt policy fits only one environment."""
+    control: str | None = None
+    """Control mode of the policy's actions; None: that of the policy's file, or joint velocities if
+    the file contains none."""
+    n: int = 64
+    """Number of episodes in each condition."""
+    trust: bool = False
+    """Whether pickles in the policy's checkpoint may be loaded, as in `make_agent`."""
+    salt: str | None = None
+    """Salt from which the seeds follow; None for the public seeds."""
+
+    @property
+    def first_seed(self) -> int:
+        """Seed of the first episode in each condition; it increases by one with each episode."""
+        return SEED if self.salt is None else draw_first_seed(self.submission.sha256, self.salt)
+
+    def make_study(self) -> Study:
+        """Return the study that plays the policy under all conditions.
+
+        Its process must be confined if the seeds follow from a salt.
+
+        Raises:
+            ConfigError: an environment does not exist, or the number of episodes is below 1.
+        """
+        for task in self.ids:
+            find_task(task)
+        agent = SeparateProcess(self.submission, self.trust, must_confine=self.salt is not None)
+        control = self.control or self.submission.control
+        env = {} if control is None else {"control": control}
+        rows = {
+            f"{task}.{name}": Row(
+                each.words, self.n, agent, setup=SETUPS[each.setup][1],
+                env={"task": task, "people": each.people, "shield": each.shield, **env},
+            )
+            for task in self.ids
+            for name, each in CONDITIONS.items()
+        }  # fmt: skip
+        shown = [column for column in COLUMNS if column.heading]
+        tables = tuple(
+            Table(task, task, {f"{task}.{name}": (each.words,)
+                               for name, each in CONDITIONS.items()}, shown, ("condition",))
+            for task in self.ids
+        )  # fmt: skip
+        return Study(
+            name=f"benchmark, version {VERSION}", title=f"Benchmark: {self.submission.policy}",
+            about=ABOUT, depends=DEPENDS, first_seed=self.first_seed, rows=rows, columns=COLUMNS,
+            tables=tables,
+        )  # fmt: skip
+
+
+def make_plan(
     policy: str,
     ids: Sequence[str] = tuple(BUILT_IN),
     control: str | None = None,
-    n_seeds: int = 64,
+    n: int = 64,
     trust: bool = False,
-) -> Study:
-    """Return the study that evaluates a policy under all conditions.
-
-    Args:
-        policy: the policy as `hrc_env.agents.registry.make_agent` accepts it.
-        ids: ids of the environments; a learnt policy fits only one environment.
-        control: control mode of the policy's actions; None: that of the policy's file, or joint
-            velocities if the file contains none.
-        n_seeds: number of episodes per row.
-        trust: whether pickles in the policy's checkpoint may be loaded, as in `make_agent`.
+) -> Plan:
+    """Return the run of a policy on the public seeds; arguments are the fields of `Plan`.
 
     Raises:
-        ConfigError: the policy or an environment does not exist, or `n_seeds` is below 1.
+        ConfigError: the policy does not exist.
     """
-    for task in ids:
-        find_task(task)
-    control = control or find_control(policy)
-    env = {} if control is None else {"control": control}
-    rows = {
-        f"{task}.{name}": Row(
-            each.words, n_seeds, policy, setup=SETUPS[each.setup][1],
-            env={"task": task, "people": each.people, "shield": each.shield, **env}, trust=trust,
-        )
-        for task in ids
-        for name, each in CONDITIONS.items()
-    }  # fmt: skip
-    shown = [column for column in COLUMNS if column.heading]
-    tables = tuple(
-        Table(task, task, {f"{task}.{name}": (each.words,) for name, each in CONDITIONS.items()},
-              shown, ("condition",))
-        for task in ids
-    )  # fmt: skip
-    return Study(
-        name=f"benchmark, version {VERSION}", title=f"Benchmark: {policy}", about=ABOUT,
-        depends=("env", "tracker", "emulator", "motion", "shield", "agents"), first_seed=SEED,
-        rows=rows, columns=COLUMNS, tables=tables,
-    )  # fmt: skip
+    submission = read_submission(policy)
+    return Plan(submission=submission, ids=tuple(ids), control=control, n=n, trust=trust)
 
 
-ENTRY_METRICS = {
-    "goals_per_minute": "goals per minute",
-    "success": "success",
-    "cost_per_minute": "cost per minute",
-    "towards_per_hour": "contacts towards per hour",
-    "contacts_per_hour": "contacts per hour",
-}
-"""Metrics in an entry for each task and condition, with their headings on the leaderboard."""
-Scores = Mapping[str, Metric]
-"""Metrics by name, as "ID.CONDITION.METRIC"."""
+def draw_first_seed(sha256: str, salt: str) -> int:
+    """Return the seed of the first episode for a policy's digest and a salt.
 
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A policy's entry on the leaderboard."""
-
-    policy: str
-    """The policy, as the option `--policy` accepts it."""
-    commit: str
-    """Commit of the repository at which the policy was evaluated."""
-    date: str
-    """Date of the run."""
-    scores: Scores
-    """Metrics of all tasks and conditions."""
-
-
-def read_entry(path: Path) -> Entry:
-    """Read an entry from its file.
-
-    Raises:
-        ConfigError: the file belongs to another version of the benchmark, or is not an entry.
+    The submitted digest fixes the policy before the salt is drawn: the policy cannot be chosen for
+    its seeds.
     """
-    try:
-        content = json.loads(path.read_text())
-        version, scores = content.pop("version"), content.pop("scores")
-        if version != VERSION:
-            raise ConfigError(
-                f"{path} is of version {version} of the benchmark, but this is version {VERSION}: "
-                "their numbers are not comparable. Run python -m hrc_env benchmark again."
-            )
-        metrics = {key: Metric(v, low, high, "", n) for key, (v, low, high, n) in scores.items()}
-        return Entry(content["policy"], content["commit"], content["date"], metrics)
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-        if isinstance(error, ConfigError):
-            raise
-        raise ConfigError(f"{path} is not a result of the benchmark ({error!r}).") from error
-
-
-def write_entry(path: Path, entry: Entry) -> None:
-    """Write an entry atomically: an interrupted write leaves no partial file."""
-    selected = {
-        name: m for name, m in entry.scores.items() if name.rsplit(".", 1)[1] in ENTRY_METRICS
-    }
-    scores = {name: [*map(_shorten, (m.value, m.low, m.high)), m.n] for name, m in selected.items()}
-    content: dict[str, Any] = {"version": VERSION, "name": path.stem, **asdict(entry)}
-    lines = json.dumps({**content, "scores": scores}, indent=1)
-    write_whole(path, lines.replace("\n   ", " ").replace("\n  ]", "]") + "\n")
-
-
-def add_entry(path: Path, policy: str, results: Path) -> None:
-    """Write a policy's entry to `path`, based on the file results.json of its benchmark run."""
-    content = json.loads(results.read_text())
-    scores = {key: Metric(**value) for key, value in content["metrics"].items()}
-    git, day = str(provenance()["git"]), datetime.date.today().isoformat()
-    write_entry(path, Entry(policy, git, day, scores))
-
-
-def _shorten(value: float) -> float:
-    return float(f"{value:.5g}")
+    digest = hashlib.sha256(f"{sha256} {salt}".encode()).digest()
+    return int.from_bytes(digest[:SALTED_BYTES], "big")

@@ -1,22 +1,14 @@
-"""The benchmark of policies: conditions, numbers, entries, what is refused."""
+"""The benchmark of policies: conditions, numbers, and what is refused."""
 
 import json
+from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.results import Metric
-from hrc_env.experiments.leaderboard import (
-    CONDITIONS,
-    MAIN,
-    VERSION,
-    Entry,
-    make_study,
-    read_entry,
-    write_entry,
-)
+from hrc_env.agents.separate import SeparateProcess
+from hrc_env.experiments.entries import read_entry
+from hrc_env.experiments.leaderboard import CONDITIONS, MAIN, SEED, draw_first_seed, make_plan
 from hrc_env.safety.incidents import KINDS
 
 pytestmark = pytest.mark.slow  # an experiment is played
@@ -24,10 +16,12 @@ pytestmark = pytest.mark.slow  # an experiment is played
 KEY = "HRCReach-v0.unaware.keypoints.none"
 
 
-class Still:
-    """Does nothing."""
+POLICY = """
+import numpy as np
 
-    def __init__(self, env_info) -> None:
+
+class Still:
+    def __init__(self, env_info):
         self.n = env_info.n_actions
 
     def act(self, observation):
@@ -36,12 +30,20 @@ class Still:
 
 def nobody(env_info):
     return None
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """The working directory, with a policy."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "still.py").write_text(POLICY)
 
 
 def test_conditions_are_twelve_each_without_and_with_a_shield():
     assert len(CONDITIONS) == 12
     assert set(MAIN) <= set(CONDITIONS)
-    rows = make_study("scripted").rows
+    rows = make_plan("scripted").make_study().rows
     one = rows["HRCReach-v0.unaware.one.qp"].keywords()
     assert len(one) == 4
     assert {turn["shield"] for turn in one} == {"qp"}
@@ -51,7 +53,7 @@ def test_conditions_are_twelve_each_without_and_with_a_shield():
 
 
 def test_numbers_are_counted_over_the_time_that_was_played():
-    study = make_study("scripted", ["HRCReach-v0"])
+    study = make_plan("scripted", ["HRCReach-v0"]).make_study()
     contacts = {f"contacts_{kind}": 0.0 for kind in KINDS}
     one = {"seconds": 30.0, "goals_reached": 3.0, "goals_missed": 1.0, "cost": 5.0, **contacts}
     two = {**one, "goals_reached": 1.0, "contacts_towards": 1.0, "contacts_standing": 2.0}
@@ -62,28 +64,26 @@ def test_numbers_are_counted_over_the_time_that_was_played():
     assert per_hour == [60.0, 180.0]
 
 
-def test_entries_are_written_and_read(tmp_path):
-    path, key = tmp_path / "mine.json", f"{KEY}.goals_per_minute"
-    scores = {key: Metric(12.345678, 12.345678, 12.345678, "", 4)}
-    write_entry(path, Entry("scripted", "abc", "2026-11-26", scores))
-    assert read_entry(path).scores[key] == Metric(12.346, 12.346, 12.346, "", 4)
-    content = json.loads(path.read_text())
-    path.write_text(json.dumps(content | {"version": VERSION + 1}))
-    with pytest.raises(ConfigError, match=r"version 2 .* Run python -m hrc_env benchmark again"):
-        read_entry(path)
-    path.write_text("{}")
-    with pytest.raises(ConfigError, match="is not a result of the benchmark"):
-        read_entry(path)
+def test_seeds_follow_from_the_digest_and_the_salt():
+    plan = make_plan("scripted")
+    assert plan.make_study().first_seed == SEED
+    salted = replace(plan, salt="drawn later").make_study()
+    assert salted.first_seed == draw_first_seed(plan.submission.sha256, "drawn later")
+    agents = [row.agent for row in salted.rows.values()]
+    assert all(isinstance(each, SeparateProcess) and each.must_confine for each in agents)
+    seeds = {draw_first_seed(sha, salt) for sha in ("a", "b") for salt in ("c", "d")}
+    assert len(seeds) == 4
+    assert max(seeds) > 10**9  # too many to try all
 
 
 def test_a_policy_is_judged_and_entered_and_goes_on(tmp_path, monkeypatch):
-    words = ["benchmark", "--policy", f"{__name__}:Still", "--ids", "HRCReach-v0", "--seeds", "4"]
+    words = ["benchmark", "--policy", "still:Still", "--ids", "HRCReach-v0", "--seeds", "4"]
     words += ["--out", str(tmp_path / "out"), "--enter", str(tmp_path / "mine.json")]
     assert main(words) == 0
     made = json.loads((tmp_path / "out" / "results.json").read_text())["metrics"]
     assert made[f"{KEY}.goals_per_minute"]["value"] == 0.0
     assert len(made) == 12 * 7
-    assert read_entry(tmp_path / "mine.json").policy == f"{__name__}:Still"
+    assert read_entry(tmp_path / "mine.json").policy == "still:Still"
     monkeypatch.setattr(
         "hrc_env.experiments.study.play_episodes", lambda *of, **_: pytest.fail("again")
     )
@@ -94,7 +94,8 @@ def test_a_policy_is_judged_and_entered_and_goes_on(tmp_path, monkeypatch):
     ("words", "says"),
     [
         (["--policy", "hrc_env.agents.nowhere:make"], "must be MODULE:FUNCTION"),
-        (["--policy", f"{__name__}:nobody"], "which has no act"),
+        (["--policy", "nowhere:make"], "must be MODULE:FUNCTION"),
+        (["--policy", "still:nobody"], "which has no act"),
         (["--policy", "scriptd"], "Did you mean 'scripted'"),
         (["--policy", "scripted", "--ids", "HRCReach-v1"], "Did you mean 'HRCReach-v0'"),
         (["--policy", "scripted", "--seeds", "0"], "--seeds must be 1 or more"),
