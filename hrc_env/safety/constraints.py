@@ -113,7 +113,7 @@ class Bodies(NamedTuple):
     shares: Floats
     """Influence of these joints on the end points (S, 2, T), with the sum 1 for each."""
     support: Support
-    """What determines the calibrated bounds on the errors of segments (B, W, S)."""
+    """Properties that determine the calibrated bounds on the errors of segments (B, W, S)."""
 
 
 class UnseenFloors(NamedTuple):

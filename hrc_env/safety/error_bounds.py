@@ -33,7 +33,7 @@ from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
 COMMAND = "python -m assets.error_bounds.calibrate"
 """Command that computes the bounds of the package."""
 DEPENDS = ("tracker", "emulator", "motion")
-"""Subsystems on whose versions the bounds depend."""
+"""Subsystems that determine the errors."""
 MAX_VIEWS = (1, 2)
 """Upper bounds on the number of views of all classes of views but the last."""
 MAX_MISFIT = (4.0, 9.0, 18.0)
@@ -62,7 +62,7 @@ class ErrorBounds(NamedTuple):
 
 
 class Support(NamedTuple):
-    """What determines the bounds of capsules besides their standard deviation."""
+    """Properties of capsules that determine their bounds, besides the standard deviation."""
 
     factor: Floats
     """Expected error divided by the standard deviation (B, W, S)."""
@@ -180,7 +180,7 @@ def _find_support(
 
 @cache
 def find_joints_that_count() -> Bools:
-    """Return a mask (S, J) of the joints whose views, misfit and age count for each capsule."""
+    """Return a mask (S, J) of the joints with views, misfit and age that count for each capsule."""
     influence = np.zeros((len(CAPSULES), 2, N_JOINTS))
     enclosure = load_enclosure()
     weights = np.abs(enclosure.weights)

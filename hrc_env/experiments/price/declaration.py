@@ -117,7 +117,7 @@ def make_price_table(
         {(task, each.name): (each.words,) for each in setups},
         (*COLUMNS, *more),
         ("perception",),
-        f"Goals that {robot} reaches beside workers who ignore it, with emulated detections and "
+        f"Goals that {robot} reaches beside unaware workers, with emulated detections and "
         f"the `{SHIELD}` shield. Each setup has the margin with which the robot touches a worker "
         f"while moving towards them {count_per_hour(level):.1f} times per hour; other contacts "
         "and the severity of contacts are not equalized. Above the force limit: share of all "
