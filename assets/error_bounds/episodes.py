@@ -184,12 +184,13 @@ def _measure_errors(simulation: Simulation, seeds: Ints, is_playing: Bools) -> l
     errors: list[Errors] = []
     for s in range(N_CAPSULES):
         is_near = lately & ~np.isnan(pairs[:, :, s, 0])
+        error_m, gap_m, std_m, constant_m = pairs[is_near][:, s].T
         errors.append(Errors(
-            *pairs[is_near][:, s].T,
-            estimate.n_views[is_near][:, counts[s]].min(-1),
-            estimate.misfit[is_near][:, counts[s]].max(-1),
-            estimate.age_s[is_near][:, counts[s]].max(-1),
-            of_slot[is_near],
+            error_m, gap_m, std_m, constant_m,
+            n_views=estimate.n_views[is_near][:, counts[s]].min(-1),
+            misfit=estimate.misfit[is_near][:, counts[s]].max(-1),
+            age_s=estimate.age_s[is_near][:, counts[s]].max(-1),
+            episode=of_slot[is_near],
         ))  # fmt: skip
     return errors
 

@@ -178,8 +178,8 @@ class Segment(NamedTuple):
     """Covariance of each joint's position (J, 3, 3) [m^2]."""
     age_s: Floats
     """Time since each joint was last supported by a measurement (J,) [s]."""
-    index: int
-    """Index of the segment."""
+    capsule: int
+    """Index of the segment in `CAPSULES`."""
     error_factor: float
     """Expected error divided by the standard deviation."""
     age_class: int
@@ -387,10 +387,10 @@ def bound_deduction(segment: Segment, params: ShieldParams) -> float:
             of_end += segment.shares[end, k] * (S[0, 0] + S[1, 1] + S[2, 2])
         variance = max(variance, of_end)
     std_m, bounds = math.sqrt(variance), params.bounds
-    error_m = params.protrusion_m[segment.index] + std_m + find_uncertainty(std_m, 0.0, params)
+    error_m = params.protrusion_m[segment.capsule] + std_m + find_uncertainty(std_m, 0.0, params)
     if segment.age_class >= 0:
-        error_m = max(error_m, bounds.bound_m[segment.index, segment.age_class, -1])
-    margin_m = params.margins_m[segment.index] + error_m
+        error_m = max(error_m, bounds.bound_m[segment.capsule, segment.age_class, -1])
+    margin_m = params.margins_m[segment.capsule] + error_m
     return margin_m + find_travel(math.sqrt(squared), params)
 
 
@@ -403,7 +403,7 @@ def find_margin(segment: Segment, std_m: float, params: ShieldParams) -> float:
         std_m: standard deviation of the position along n [m].
         params: margins and calibrated bounds.
     """
-    s = segment.index
+    s = segment.capsule
     constant_m = params.protrusion_m[s]
     constant_m += find_uncertainty(std_m, find_segment_age(segment), params)
     expected_m = segment.error_factor * std_m

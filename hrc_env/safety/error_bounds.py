@@ -187,7 +187,8 @@ def find_joints_that_count() -> Bools:
     shares = weights / weights.sum(-1, keepdims=True)
     for s, end, k in np.ndindex(shares.shape):
         influence[s, end, enclosure.joints[s, end, k]] += shares[s, end, k]
-    return (influence > MIN_SHARE).any(1)
+    counts: Bools = np.asarray((influence > MIN_SHARE).any(1))
+    return counts
 
 
 @kernel

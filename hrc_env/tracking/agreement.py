@@ -69,9 +69,10 @@ def _measure_agreement(
     """Fill in `agreement`, which is 0; the other arguments are those of `add_agreement`."""
     px, mean, velocity = detections.px, estimate.mean_world, estimate.velocity_world
     for b, c, w, j in np.ndindex(detections.confidence.shape):
-        sigma_px = detections.sigma_px[b, c, w, j]
+        sigma_px = float(detections.sigma_px[b, c, w, j])
+        confidence = float(detections.confidence[b, c, w, j])
         u, v = px[b, c, w, j, 0], px[b, c, w, j, 1]
-        if not is_measurement(u, v, detections.confidence[b, c, w, j], sigma_px):
+        if not is_measurement(u, v, confidence, sigma_px):
             continue
         (x, y, z), (vx, vy, vz), ago = mean[b, w, j], velocity[b, w, j], age_s[b, c]
         at_u, at_v, depth = pixel_of(P[c], x - ago * vx, y - ago * vy, z - ago * vz)
