@@ -25,6 +25,9 @@ from hrc_env.safety.error_bounds import (
     load_error_bounds,
     read_error_bounds,
 )
+from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.estimators import EstimatorSpec
+from hrc_env.tracking.particle import ParticleEstimator
 
 PACKAGED = Path(error_bounds.__file__).with_suffix(".json")
 CONFORMAL, CONSTANT = (ShieldConfig("qp", margin=each) for each in ("conformal", "constant"))
@@ -81,6 +84,7 @@ def test_the_worst_joint_of_a_capsule_counts(belief, name, value):
         ({}, True),
         ({"estimator": "kalman"}, True),
         ({"estimator": "triangulation"}, False),
+        ({"estimator": EstimatorSpec("mine", ParticleEstimator, ParticleConfig)}, False),
         ({"config": {"emulator": {"error_scale": 2.0}}}, False),
         ({"config": {"tracker": {"damping": 0.4}}}, False),
         ({"perception": "truth"}, True),
@@ -130,6 +134,25 @@ def test_the_clearance_is_the_gap_less_the_bound(belief, monkeypatch):
     assert measured[0] - measured[1] == pytest.approx(0.1)
     wider = replace(CONFORMAL, margin_m=0.05, hand_margin_m=0.05)
     assert clearance(near, wider) == pytest.approx(measured[1] - 0.05)
+
+
+def test_a_wide_bound_makes_distant_pairs_relevant(belief, monkeypatch):
+    near, bounds, wide_m = seen_as(belief, **WELL), load_error_bounds(), 0.7
+    with_bounds(
+        monkeypatch, expected_m=np.full_like(bounds.expected_m, np.inf),
+        bound_m=np.full_like(bounds.bound_m, wide_m),
+    )  # fmt: skip
+    apart_m = near.separation.distance_m[:, 0]
+    distant = (apart_m > 0.35) & (apart_m < 0.65)
+    assert distant.any()
+    command = np.zeros_like(near.robot.q)
+    found_m = limit_command(near, command, 0.04, CONFORMAL).values["clearance_m"]
+    assert (found_m[distant] < apart_m[distant] - wide_m + 1e-9).all()
+
+
+def test_a_lost_worker_has_no_bound(belief):
+    lost = seen_as(seen_as(belief, **WELL), unobserved_s=0.3)
+    np.testing.assert_array_equal(clearance(lost, CONFORMAL), clearance(lost, CONSTANT))
 
 
 def test_where_nothing_is_calibrated_the_constants_hold(belief, monkeypatch):
