@@ -59,6 +59,8 @@ def from_mapping(
         path: prefix of the field names in error messages.
         kinds: types of fields whose hints in the dataclass leave the type open.
 
+    Numbers must be finite, except for fields that `kind.MAY_BE_NAN` names.
+
     Raises:
         ConfigError: a field is unknown or missing, its value has the wrong type or length, or the
             dataclass rejects it; the message contains the path, as in `scene.cameras[0].name`.
@@ -71,7 +73,11 @@ def from_mapping(
         where = f"{path}{name}"
         if where not in names:
             raise _unknown_field(kind, "config field", path, name)
-        values[name] = convert_to_hint(hints[name], value, where)
+        is_nan = isinstance(value, float) and math.isnan(value)
+        if is_nan and name in getattr(kind, "MAY_BE_NAN", ()):
+            values[name] = value
+        else:
+            values[name] = convert_to_hint(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
         if nothing and each.name not in values:

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,6 +24,9 @@ PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3
 @dataclass(frozen=True, slots=True)
 class Metric:
     """A number with its interval and sample size."""
+
+    MAY_BE_NAN: ClassVar[tuple[str, ...]] = ("low", "high")
+    """Fields that are NaN without an interval, also in files."""
 
     value: float
     """Value of the metric: a mean, rate, fraction or median."""

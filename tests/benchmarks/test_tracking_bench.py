@@ -17,6 +17,7 @@ from benchmarks.tracking.timing import time_estimator
 from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.engines.local import Serial
+from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.experiments import runner
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -74,7 +75,8 @@ def test_every_key_is_written_in_the_shared_form(end_to_end):
     assert f"default_over.env.four_cameras.{DLT}" in metrics
     for metric in metrics.values():
         assert set(metric) == {"value", "low", "high", "unit", "n"}
-        assert np.isfinite([metric["value"], metric["low"], metric["high"]]).all()
+        assert np.isfinite(metric["value"])
+        assert np.isfinite([metric["low"], metric["high"]]).all() or metric["n"] < MIN_SEEDS
 
 
 def test_the_report_has_everybody(end_to_end):

@@ -111,7 +111,7 @@ def test_what_is_no_change_is_refused(words, says, tmp_path: Path):
         (["--motions", "nowhere.npz"], "nowhere.npz"),
         (["--appearance", "varid"], "'varied'"),
         (["--shield", "qpp"], "'qp'"),
-        (["--shield", '{"margin": 1}'], "'shield.margin_m'"),
+        (["--shield", '{"margins_m": 1}'], "'shield.margin_m'"),
     ],
 )
 def test_a_wrong_word_is_answered_with_what_would_do(words, says, capsys):

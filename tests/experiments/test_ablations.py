@@ -10,6 +10,7 @@ import pytest
 from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.experiments.ablations import experiment
 from hrc_env.experiments.ablations import play as playing
 from hrc_env.experiments.ablations.ablation import Setting
@@ -85,7 +86,9 @@ def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
             for what in ("id_switches", "idf1"):
                 assert (f"{what}.{key}" in metrics) == (setting.n_workers > 1)
     for name, metric in metrics.items():
-        assert np.isfinite([metric.value, metric.low, metric.high]).all(), name
+        if not name.startswith("p"):
+            assert np.isfinite(metric.value), name
+        assert np.isfinite([metric.low, metric.high]).all() or metric.n < MIN_SEEDS, name
 
 
 def test_names_are_said_once_and_have_no_dots():
@@ -155,7 +158,9 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     assert resumed.keys() == whole.keys()
     for name, metric in whole.items():  # sums of another process may round otherwise
         numbers = (resumed[name].value, resumed[name].low, resumed[name].high)
-        assert numbers == pytest.approx((metric.value, metric.low, metric.high), rel=1e-12)
+        assert numbers == pytest.approx(
+            (metric.value, metric.low, metric.high), rel=1e-12, nan_ok=True
+        )
     assert kept == {name: (out / "parts" / name).stat().st_mtime_ns for name in kept}
 
 

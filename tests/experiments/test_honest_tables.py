@@ -21,8 +21,8 @@ from hrc_env.evaluation.intervals import MIN_SEEDS
 from hrc_env.evaluation.sums import INTERVENTIONS, RARE, STATISTICS
 from hrc_env.experiments import columns
 from hrc_env.experiments.columns import Column
+from hrc_env.experiments.entries import read_entry
 from hrc_env.experiments.impact.metrics import PER_1000, compute_metrics
-from hrc_env.experiments.leaderboard import read_entry
 from hrc_env.experiments.report import Table, format_cell, format_interval, format_metric
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import REFERENCE, PerceptionSetup

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from docs import tables
@@ -35,7 +36,7 @@ def test_every_number_is_there(end_to_end):
     assert written.keys() == metrics.keys()
     for name in ("kalman", "paper_restarts"):
         assert f"difference.rmse_m.{name}.multi" in metrics
-        assert 0 < metrics[f"p.rmse_m.{name}.camera_1"].value <= 1
+        assert np.isnan(metrics[f"p.rmse_m.{name}.camera_1"].value), "one seed shows no difference"
     asked = tables.asked("site")
     assert {name for name in asked if name.split(".")[-2] in TINY.estimators} <= metrics.keys()
 

@@ -27,7 +27,7 @@ CALLS = {  # what is meant, and calls that nearly say it
     "safety/*": [lambda: hrc_env.HRCVecEnv(2, perception="none", infos=("safty/*",))],
     "proximity": [lambda: hrc_env.RewardConfig(proximty=1.0)],
     "reward.proximity": [lambda: make(config={"reward": {"proximty": 1.0}})],
-    "margin_m": [lambda: hrc_env.ShieldConfig(kind="qp", margin=0.1)],
+    "margin_m": [lambda: hrc_env.ShieldConfig(kind="qp", margins_m=0.1)],
     "amount": [lambda: hrc_env.FaultConfig(kind="late", amuont=0.2)],
     "hfov_deg": [lambda: hrc_env.CameraConfig("a", (1.0, 1.0, 2.0), hfov=60.0)],
     "lost_after_s": [lambda: hrc_env.TrackerConfig(lost_after=0.5)],
