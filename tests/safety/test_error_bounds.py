@@ -289,8 +289,7 @@ def test_in_other_episodes_the_packages_bounds_cover_what_they_say():
     errors = collect_errors(Drive("shielded", shield=CONSTANT), seed=15_000_000, n_episodes=192)
     for part, row in measure_coverage(errors, load_error_bounds()).items():
         if row["bound.episodes"] >= 100:
-            assert row["bound.covered"] > 0.99, part
-            assert row["bound.high"] > calibration.LEVEL, part
+            assert row["bound.covered"] > 0.995, part
             assert row["with_bound"] > 0.95, part
     assert {"hand", "forearm", "head", "chest"} <= set(
         measure_coverage(errors, load_error_bounds())
