@@ -21,7 +21,7 @@ from rich.table import Table
 from assets.enclosure.poses import EVERY, N_EPISODES, N_STEPS, TASKS, Poses, play
 from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.geometry.enclosure import N_TERMS, Enclosure, enclose
+from hrc_env.geometry.enclosure import N_TERMS, Enclosure, enclose, name_part
 from hrc_env.worker.body import load_body, worker_names
 
 OUT = Path(__file__).parents[2] / "hrc_env" / "geometry" / "enclosure.json"
@@ -89,8 +89,8 @@ def fit_enclosure(bodies: Sequence[Poses], capsules: Sequence[str]) -> Enclosure
         limits, np.zeros(n),
     )  # fmt: skip
     radius_m, per_width = np.zeros(n), np.zeros(n)
-    for part in {_name_part(name) for name in capsules}:
-        sides = [s for s, name in enumerate(capsules) if _name_part(name) == part]
+    for part in {name_part(name) for name in capsules}:
+        sides = [s for s, name in enumerate(capsules) if name_part(name) == part]
         least, least_per_width = 0.0, 0.0
         for body, s in product(bodies, sides):
             needed_m, width_m = (
@@ -103,11 +103,6 @@ def fit_enclosure(bodies: Sequence[Poses], capsules: Sequence[str]) -> Enclosure
         radius_m[sides] = (least if is_fixed else 0.0) - PROTRUSION_M[part]
         per_width[sides] = 0.0 if is_fixed else least_per_width
     return draft._replace(radius_m=radius_m, radius_per_width=per_width)
-
-
-def _name_part(capsule: str) -> str:
-    """Return the name of a capsule without its side."""
-    return capsule.removeprefix("left_").removeprefix("right_")
 
 
 def measure_width(joints_world: Points3) -> Floats:

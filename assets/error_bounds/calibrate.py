@@ -5,6 +5,7 @@
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,12 +19,12 @@ from assets.error_bounds.episodes import CONSTANT, Drive, Errors, collect_all
 from hrc_env.core.results import write_whole
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.geometry.enclosure import CAPSULES
+from hrc_env.geometry.enclosure import CAPSULES, name_part
 from hrc_env.safety.error_bounds import (
     MAX_MISFIT,
     MAX_VIEWS,
     ErrorBounds,
-    write_error_bounds,
+    describe_error_bounds,
 )
 
 OUT = Path(__file__).parents[2] / "hrc_env" / "safety" / "error_bounds.json"
@@ -64,7 +65,7 @@ class Factors(NamedTuple):
     """Factor of each class of misfit (M,)."""
 
 
-def main(seed: int = 13_000_000, episodes: int = 1024, out: Path = OUT) -> None:
+def main(seed: int = 13_000_000, episodes: int = 768, out: Path = OUT) -> None:
     """Calibrate the bounds.
 
     Args:
@@ -75,21 +76,16 @@ def main(seed: int = 13_000_000, episodes: int = 1024, out: Path = OUT) -> None:
     errors = collect_all(DRIVES, seed, episodes, "Calibrating", Console())
     bounds = calibrate([_join(each) for each in zip(*errors, strict=True)])
     made = {
-        "command": " ".join(["python -m assets.error_bounds.calibrate", *sys.argv[1:]]),
+        "command": " ".join(["python -m assets.error_bounds.calibrate", shlex.join(sys.argv[1:])]),
         "seed": seed, "episodes": episodes, "level": LEVEL,
         "drives": [drive.name for drive in DRIVES],
     }  # fmt: skip
-    write_whole(out, json.dumps({"made": made, **write_error_bounds(bounds)}) + "\n")
+    write_whole(out, json.dumps({"made": made, **describe_error_bounds(bounds)}) + "\n")
 
 
 def _join(parts: Sequence[Errors]) -> Errors:
     """Return several samples as one."""
     return Errors(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-
-
-def name_part(capsule: str) -> str:
-    """Return the name of a capsule without its side."""
-    return capsule.removeprefix("left_").removeprefix("right_")
 
 
 def join_sides(errors: Sequence[Errors]) -> dict[str, Errors]:

@@ -7,6 +7,7 @@ measured.
 """
 
 import json
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,14 +24,13 @@ from assets.error_bounds.calibrate import (
     Factors,
     find_expected_error,
     join_sides,
-    name_part,
 )
-from assets.error_bounds.episodes import SEEDS_APART, Drive, Errors, collect_all
+from assets.error_bounds.episodes import CONSTANT, SEEDS_APART, Drive, Errors, collect_all
 from hrc_env.core.results import write_whole
-from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.evaluation.intervals import bootstrap
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.evaluation.intervals import estimate_clustered_share
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.geometry.enclosure import CAPSULES
+from hrc_env.geometry.enclosure import CAPSULES, name_part
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.error_bounds import ErrorBounds, load_error_bounds
 
@@ -39,14 +39,16 @@ CONFORMAL = "scripted robot, conformal shield"
 ELSEWHERE = (
     Drive(CONFORMAL, shield=ShieldConfig("qp", margin="conformal")),
     Drive("true joints", shield="qp", setup=PerceptionSetup("truth")),
-    Drive("one camera after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=1)),
-    Drive("two cameras after 1 s", shield="qp", setup=PerceptionSetup(n_cameras=2)),
-    Drive("handing over", shield="qp", task="HRCHandover-v0"),
-    Drive("rendered images", shield="qp", setup=PerceptionSetup("pixels")),
+    Drive("one camera after 1 s", shield=CONSTANT, setup=PerceptionSetup(n_cameras=1)),
+    Drive("two cameras after 1 s", shield=CONSTANT, setup=PerceptionSetup(n_cameras=2)),
+    Drive("handing over", shield=CONSTANT, task="HRCHandover-v0"),
+    Drive("rendered images", shield=CONSTANT, setup=PerceptionSetup("pixels")),
 )
 """Robots and cameras that were not calibrated."""
 AVAILABLE = {drive.name: drive for drive in (*DRIVES, *ELSEWHERE)}
 """All robots and cameras by name."""
+SHOWN = ("covered", "low", "high")
+"""Numbers of a share in the table."""
 Coverage = Mapping[str, float]
 """Numbers of one part of the body by name, with intervals "low" and "high"."""
 
@@ -68,11 +70,11 @@ def main(
         if name in (only or AVAILABLE):
             first = seed + SEEDS_APART * k
             (errors,) = collect_all([drive], first, episodes, name, console)
-            command = " ".join(["python -m assets.error_bounds.coverage", *sys.argv[1:]])
+            command = " ".join(["python -m assets.error_bounds.coverage", shlex.join(sys.argv[1:])])
             made = {"command": command, "seed": first, "episodes": episodes}
             results[name] = {"made": made, "parts": measure_coverage(errors, bounds)}
             write_whole(out, json.dumps(results, indent=1) + "\n")
-    console.print(make_table(results))
+            console.print(make_table(name, results[name]["parts"]))
 
 
 def find_bounds(sample: Errors, bounds: ErrorBounds, s: int) -> Floats:
@@ -114,42 +116,30 @@ def measure_coverage(errors: Sequence[Errors], bounds: ErrorBounds) -> dict[str,
 def _count_covered(name: str, sample: Errors, margin_m: Floats, among: Bools) -> Coverage:
     """Return the share of errors below a margin, with its interval, and the mean margin.
 
-    The interval is computed by bootstrap over episodes.
+    Errors of the same episode are dependent.
     """
     if not among.any():
         return {}
     _, episode = np.unique(sample.episode[among], return_inverse=True)
-    n = np.bincount(episode)
     covered = np.bincount(episode, sample.error_m[among] <= margin_m[among])
-
-    def find_share(weights: Ints) -> Floats:
-        return (weights @ covered) / (weights @ n)
-
-    share = bootstrap(find_share, len(n), "1")
+    share = estimate_clustered_share(covered, np.bincount(episode).astype(float))
     return {
-        f"{name}.episodes": len(n), f"{name}.covered": share.value, f"{name}.low": share.low,
+        f"{name}.episodes": share.n, f"{name}.covered": share.value, f"{name}.low": share.low,
         f"{name}.high": share.high, f"{name}.mean_m": float(margin_m[among].mean()),
     }  # fmt: skip
 
 
-def make_table(results: Mapping[str, Any]) -> Table:
-    """Return the table of the coverage for each robot and part."""
+def make_table(robot: str, parts: Mapping[str, Coverage]) -> Table:
+    """Return the table of the coverage of each part of the body [%]."""
     words = {"bound": "by bounds", "margin": "with fallback", "constant": "by constant margin"}
-    table = Table("robot and cameras", "part", "errors", "with bound")
-    for each in words.values():
-        table.add_column(f"{each} (asked {LEVEL})")
-        table.add_column("mean [cm]")
-    for drive, result in results.items():
-        for part, row in result["parts"].items():
-            cells = [drive, part, f"{row['errors']:.0f}", f"{row['with_bound']:.3f}"]
-            for name in words:
-                if f"{name}.covered" in row:
-                    covered, low, high = (row[f"{name}.{k}"] for k in ("covered", "low", "high"))
-                    mean_cm = 100 * row[f"{name}.mean_m"]
-                    cells += [f"{covered:.4f} ({low:.4f}, {high:.4f})", f"{mean_cm:.1f}"]
-                else:
-                    cells += ["", ""]
-            table.add_row(*cells)
+    heads = [f"{each} [%]" for each in ("with bound", *words.values())]
+    table = Table("part", *heads, title=f"{robot} (asked {100 * LEVEL:g} %)")
+    for part, row in parts.items():
+        cells = [part, f"{100 * row['with_bound']:.1f}"]
+        for name in words:
+            known = [100 * row[f"{name}.{k}"] for k in SHOWN if f"{name}.{k}" in row]
+            cells.append("{:.2f} ({:.2f} to {:.2f})".format(*known) if known else "none")
+        table.add_row(*cells)
     return table
 
 

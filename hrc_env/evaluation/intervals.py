@@ -32,6 +32,7 @@ N_FLIPS = (4_000, 40_000)
 `CLOSER_P`, as a p-value that is adjusted for many contrasts must be known more closely (sequential
 Monte Carlo test; Besag and Clifford 1991, doi:10.1093/biomet/78.2.301)."""
 CLOSER_P = 0.02
+"""P-value below which more swaps are drawn."""
 P, HOLM = "p.", "p_holm."
 """Prefixes of the names of p-values: of a single contrast, and adjusted for all of a study."""
 ALPHA = 0.05
@@ -373,9 +374,7 @@ def estimate_clustered_share(
     independent trials whose fraction would vary as much as it does over seeds (Korn and Graubard
     1998, Survey Methodology 24:193-201). If no trial or every trial has the event, it is the number
     of seeds. Otherwise, the interval is NaN for fewer than `MIN_SEEDS` seeds. If most events occur
-    in very few seeds, the interval is still somewhat too narrow, though less so than a bootstrap:
-    it holds a share of 2 % in 20 seeds in 95 % of cases if seeds are similar, and in 83 % if most
-    have no event (bootstrap: 89 % and 73 %).
+    in very few seeds, the interval is still too narrow, though less so than a bootstrap.
 
     Args:
         counts: number of trials with the event (n,) per seed, such as steps of an episode.

@@ -83,6 +83,20 @@ CAPSULE: dict[str, int] = {name: index for index, name in enumerate(CAPSULES)}
 N_CAPSULES = len(CAPSULES)
 
 
+@cache
+def find_shares() -> Floats:
+    """Return the influence of joints on the ends of capsules (S, 2, `N_TERMS`), with the sum 1."""
+    influence = np.abs(load_enclosure().weights)
+    shares = influence / influence.sum(-1, keepdims=True)
+    shares.setflags(write=False)
+    return shares
+
+
+def name_part(capsule: str) -> str:
+    """Return the name of a capsule without its side."""
+    return capsule.removeprefix("left_").removeprefix("right_")
+
+
 def enclose(joints_world: Points3, enclosure: Enclosure | None = None) -> BodyCapsules:
     """Return the capsules that enclose bodies with joints (..., 15, 3) [m].
 

@@ -163,10 +163,16 @@ class EmulatorPipeline(PoseTracking):
     """The pipeline of level `keypoints`, which uses an emulator of the detector."""
 
     def __init__(
-        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
+        self,
+        scene: Scene,
+        batch: int,
+        tracker: Estimator,
+        config: HRCConfig,
+        schedule: Schedule,
+        is_calibrated: bool,
     ) -> None:
         self.cameras = EmulatedCameras(scene, batch, config, schedule)
-        super().__init__(batch, make_setup(scene, config), tracker, self.cameras)
+        super().__init__(batch, make_setup(scene, config, is_calibrated), tracker, self.cameras)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
         """Return a mask (B, C) of the cameras with an available image that is not blank."""

@@ -96,9 +96,8 @@ def make_pipeline(
         prior = oracle.estimate_prior(batch, scene.n_workers, config.tracker)
         return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
-        pipeline = EmulatorPipeline(scene, batch, tracker, config, schedule)
-        pipeline.is_calibrated = has_calibrated_errors(estimator, config)
-        return pipeline
+        is_calibrated = has_calibrated_errors(estimator, config)
+        return EmulatorPipeline(scene, batch, tracker, config, schedule, is_calibrated)
     lender = like if isinstance(like, PixelPipeline) else None
     return PixelPipeline(scene, batch, tracker, config, schedule, lender)
 

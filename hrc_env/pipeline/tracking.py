@@ -149,10 +149,18 @@ class TrackingSetup:
     """Settings of the assignment of detected poses to workers."""
     calibration: Calibration = field(default_factory=read_calibration)
     """Calibration of the errors of the joints detected by the network."""
+    is_calibrated: bool = False
+    """Whether bounds on the errors of the estimates are calibrated (`safety.error_bounds`)."""
 
 
-def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
-    """Return the setup for tracking the workers of a scene."""
+def make_setup(scene: Scene, config: HRCConfig, is_calibrated: bool = False) -> TrackingSetup:
+    """Return the setup for tracking the workers of a scene.
+
+    Args:
+        scene: the scene with the rig's cameras.
+        config: settings of the environment.
+        is_calibrated: whether bounds on the errors of the estimates are calibrated.
+    """
     return TrackingSetup(
         cameras=scene.cameras,
         n_workers=scene.n_workers,
@@ -160,6 +168,7 @@ def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
         dt_s=config.ctrl_dt,
         association=config.association,
         calibration=config.emulator.make_calibration(),
+        is_calibrated=is_calibrated,
     )
 
 
@@ -191,8 +200,6 @@ class PoseTracking(PerceptionPipeline):
         self.frozen = make_frozen(batch, n_cameras)
         self.monitored = make_monitor(batch, n_cameras)
         self.presence = Presence(batch, n_workers, setup.coverage)
-        self.is_calibrated = False
-        """Whether bounds on the errors of the estimates are calibrated."""
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
         """(C, 3) principal point (x, y) and focal length of each camera [px]."""
 
@@ -248,7 +255,8 @@ class PoseTracking(PerceptionPipeline):
         shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
         looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         estimate = add_agreement(estimate, keypoints, age_s, self.P, self.axes[:, 2])
-        estimate.calibrated[:] = self.is_calibrated
+        if self.setup.is_calibrated:
+            estimate = replace(estimate, calibrated=np.ones(estimate.tracked.shape, np.bool_))
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 

@@ -30,7 +30,13 @@ from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
 from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
-from hrc_env.geometry.enclosure import CAPSULES, enclose, find_velocities, load_enclosure
+from hrc_env.geometry.enclosure import (
+    CAPSULES,
+    enclose,
+    find_shares,
+    find_velocities,
+    load_enclosure,
+)
 from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.constraints import (
@@ -208,7 +214,6 @@ def describe_bodies(
     walking_m_s = WALKING_M_S if config.worker_speed_m_s is None else config.worker_speed_m_s
     capsules, enclosure, support = enclose(mean), load_enclosure(), find_support(estimate, bounds)
     support.age_class[is_lost] = NOT_CALIBRATED
-    influence = np.abs(enclosure.weights)
     return Bodies(
         segments=capsules.ends_world,
         radii_m=capsules.radius_m,
@@ -220,7 +225,7 @@ def describe_bodies(
         contact_m_s=contact_m_s,
         robot_share_m_s=touches.capsule_m_s,
         joints=enclosure.joints,
-        shares=influence / influence.sum(-1, keepdims=True),
+        shares=find_shares(),
         support=support,
     )
 

@@ -28,7 +28,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.core.versions import read_versions
-from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
+from hrc_env.geometry.enclosure import CAPSULES, find_shares, load_enclosure
 
 COMMAND = "python -m assets.error_bounds.calibrate"
 """Command that computes the bounds of the package."""
@@ -82,7 +82,7 @@ def load_error_bounds() -> ErrorBounds:
 
 
 def read_error_bounds(path: Path) -> ErrorBounds:
-    """Read bounds that `write_error_bounds` has written; see `load_error_bounds`."""
+    """Read bounds that `describe_error_bounds` describes; see `load_error_bounds`."""
     renew = f"Calibrate again, in a clone, by `{COMMAND}`, or use margin='constant'."
     if not path.is_file():
         raise ConfigError(f"The calibrated error bounds {path.name} are missing. {renew}")
@@ -109,7 +109,7 @@ def read_error_bounds(path: Path) -> ErrorBounds:
     return bounds
 
 
-def write_error_bounds(bounds: ErrorBounds) -> dict[str, Any]:
+def describe_error_bounds(bounds: ErrorBounds) -> dict[str, Any]:
     """Return bounds as values for a JSON file, with the versions of the subsystems."""
     versions = read_versions()
     values = {name: values.tolist() for name, values in zip(bounds._fields, bounds, strict=True)}
@@ -182,11 +182,9 @@ def _find_support(
 def find_joints_that_count() -> Bools:
     """Return a mask (S, J) of the joints with views, misfit and age that count for each capsule."""
     influence = np.zeros((len(CAPSULES), 2, N_JOINTS))
-    enclosure = load_enclosure()
-    weights = np.abs(enclosure.weights)
-    shares = weights / weights.sum(-1, keepdims=True)
+    joints, shares = load_enclosure().joints, find_shares()
     for s, end, k in np.ndindex(shares.shape):
-        influence[s, end, enclosure.joints[s, end, k]] += shares[s, end, k]
+        influence[s, end, joints[s, end, k]] += shares[s, end, k]
     counts: Bools = np.asarray((influence > MIN_SHARE).any(1))
     return counts
 
