@@ -25,8 +25,8 @@ PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3
 class Metric:
     """A number with its interval and sample size."""
 
+    # Fields that are NaN without an interval, also in files.
     MAY_BE_NAN: ClassVar[tuple[str, ...]] = ("low", "high")
-    """Fields that are NaN without an interval, also in files."""
 
     value: float
     """Value of the metric: a mean, rate, fraction or median."""

@@ -11,6 +11,7 @@ import pytest
 from docs import tables
 from hrc_env.agents import policies as kept
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.mapping import for_json
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import GAPS_M, Bins
 from hrc_env.evaluation.intervals import estimate_binned_quantile
@@ -239,7 +240,8 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) == 4  # truth and none, two policies each
     assert not (tmp_path / "results.json").exists()
-    np.testing.assert_equal(run_experiment(TINY, tmp_path, silent), metrics)
+    resumed = run_experiment(TINY, tmp_path, silent)
+    np.testing.assert_equal(for_json(resumed, "resumed"), for_json(metrics, "metrics"))
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
