@@ -65,7 +65,7 @@ class Factors(NamedTuple):
     """Factor of each class of misfit (M,)."""
 
 
-def main(seed: int = 13_000_000, episodes: int = 768, out: Path = OUT) -> None:
+def main(seed: int = 13_000_000, episodes: int = 1536, out: Path = OUT) -> None:
     """Calibrate the bounds.
 
     Args:
