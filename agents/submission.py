@@ -33,7 +33,7 @@ class Submission:
     """The same for a process that has the files in its working directory."""
     files: Mapping[str, bytes] = field(default_factory=dict[str, bytes], repr=False)
     """Content of the files by path; empty for an agent without files."""
-    interface: Interface = Interface()
+    interface: Interface = field(default_factory=Interface)
     """Settings of an environment that a file of the policy states to be necessary."""
 
     @property
