@@ -7,12 +7,10 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.evaluation import intervals
@@ -109,19 +107,30 @@ def summarize_runs(metrics: Metrics, rows: Mapping[str, list[str]]) -> dict[str,
             of_runs = [metrics[f"{row}.{name}"] for row in names]
             iqm = intervals.estimate_run_iqm([[each.value for each in of_runs]], of_runs[0].unit)
             summary[f"{learner}.{name}"] = iqm
-        counts = [_count(metrics[f"{row}.towards"]) for row in names]
-        n_episodes = [metrics[f"{row}.towards"].n for row in names]
-        seconds = [metrics[f"{row}.seconds"].value for row in names]
-        hours = np.multiply(n_episodes, seconds) / 3600
-        summary[f"{learner}.towards"] = intervals.estimate_rate(counts, n_episodes)
-        summary[f"{learner}.towards"] = replace(summary[f"{learner}.towards"], n=sum(n_episodes))
-        summary[f"{learner}.towards_per_hour"] = intervals.estimate_rate(counts, hours, "1/h")
+        towards = [metrics[f"{row}.towards"] for row in names]
+        seconds = [metrics[f"{row}.seconds"] for row in names]
+        hours = [each.n * each.value / 3600 for each in seconds]
+        summary[f"{learner}.towards"] = pool_rates(towards)
+        summary[f"{learner}.towards_per_hour"] = intervals.estimate_rate(
+            [_count(each) for each in towards], hours, "1/h"
+        )
         shares = [metrics[f"{row}.above_force_limit"] for row in names]
         known = [each for each in shares if each.n]
         summary[f"{learner}.above_force_limit"] = intervals.estimate_share_of(
             [_count(each) for each in known], [each.n for each in known]
         )
     return summary
+
+
+def pool_rates(rates: Sequence[Metric]) -> Metric:
+    """Return the rate of events per episode of several policies together, with its exact interval.
+
+    Args:
+        rates: rate per episode of each policy; `Metric.n` is the number of its episodes.
+    """
+    n_episodes = [each.n for each in rates]
+    pooled = intervals.estimate_rate([_count(each) for each in rates], n_episodes, rates[0].unit)
+    return replace(pooled, n=sum(n_episodes))
 
 
 def _count(metric: Metric) -> int:

@@ -103,6 +103,8 @@ class Table:
     """Rows of single trained policies, in a table that compares learners. They have intervals only
     of counts of rare events: a bootstrap over the episodes of one policy does not contain the
     variation between trainings (`hrc_env.evaluation.intervals.estimate_run_iqm`)."""
+    fewest: int = MIN_SEEDS
+    """Smallest number of seeds with a bootstrap interval; `MIN_RUNS` if a seed is a training."""
 
     def check(self, known: Collection[str]) -> None:
         """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.
@@ -176,7 +178,7 @@ class Table:
         ]
         sentences = []
         if any(has_no_interval(metrics[name]) for _, name in shown):
-            sentences.append(TOO_FEW_SEEDS)
+            sentences.append(TOO_FEW_SEEDS.format(self.fewest))
         if any(row in self.rows for row in self.trained):
             sentences.append(ONE_TRAINING)
         tested = [name_adjusted(name) for column, name in shown if column.signed and column.marked]
@@ -213,7 +215,9 @@ class Table:
             metrics: metrics by name.
         """
         columns = [column for column in self.columns if not column.counted]
-        names = {name for row in self.trained for each in columns for name in each.list_metrics(row)}
+        names = {
+            name for row in self.trained for each in columns for name in each.list_metrics(row)
+        }
         return {
             name: replace(each, low=each.value, high=each.value) if name in names else each
             for name, each in metrics.items()
@@ -310,10 +314,10 @@ def describe_quick_run(
 MAX_DIGITS = 6
 """Largest number of decimals to which small numbers extend a table's."""
 TOO_FEW_SEEDS = (
-    f"Cells without an interval have too few seeds (fewer than {MIN_SEEDS}), or resamples of the "
-    "seeds without a finite value."
+    "Cells without an interval have too few seeds (fewer than {}), or resamples of the seeds "
+    "without a finite value."
 )
-"""Sentence below tables with numbers from too few seeds."""
+"""Sentence below tables with numbers from too few seeds, with a placeholder for `Table.fewest`."""
 ONE_TRAINING = (
     "Rows of a single trained policy have intervals only of counted events, over its episodes."
 )

@@ -114,9 +114,7 @@ def sweep_path(
     path = np.einsum("btcij,bcej->btcei", frames[..., :3, :3], local)
     path += frames[..., None, :3, 3]
     start, middle, stop = path[:, :-1:2], path[:, 1::2], path[:, 2::2]
-    before_m, after_m = (
-        np.linalg.norm(each - middle, axis=-1).max(-1) for each in (start, stop)
-    )
+    before_m, after_m = (np.linalg.norm(each - middle, axis=-1).max(-1) for each in (start, stop))
     half_s = moved_s[:, 1::2] - moved_s[:, :-1:2]
     speed_m_s = before_m * (rate[:, :-1:2] / np.maximum(half_s, 1e-9))[..., None]
     radii_m = robot.capsule_radius_m + np.maximum(before_m, after_m)
