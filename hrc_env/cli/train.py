@@ -31,7 +31,7 @@ class Train(TrainingRequest):
         for name in ("num_envs", "threads", "episodes"):
             check_at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
         for name in ("seed", "proximity", "shield_change", "ramp", "demonstrations"):
-            check_at_least(f"--{name}", getattr(self, name), 0)
+            check_at_least(f"--{name.replace('_', '-')}", getattr(self, name), 0)
         mine = fill_in(self)
         check_at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
