@@ -204,41 +204,6 @@ NOTE = (
     "from five seeds on. Contacts towards the worker and those above the force limit: of all "
     "policies together, with exact intervals."
 )
-NOTE_ON_SEEDS, trained=tuple(shown)),
-        ),
-        derive=partial(summarize_runs, rows=of_arm),
-        conditions=Conditions(
-            people="`attentive`", scene="`lab`", perception="`keypoints`",
-            chosen_on=f"policies were trained on seeds {seeds}; the weight of the penalty and the "
-            f"horizons were tried in one training on seed 18,500,000; {SHIELD_CHOSEN_ON}",
-            worker=WORKER, seeds=format_seeds(range(FIRST_SEED, FIRST_SEED + n_episodes)),
-        ),
-        n_quick=2,
-    )  # fmt: skip
-
-
-def make_default(out: Path) -> Study:
-    """Return the study with default arguments and the policies in the folder `out`."""
-    return make_study(make_trainings(UnderShieldArguments(out)))
-
-
-def main() -> int:
-    """Train and evaluate the policies, print the report, and return the exit status."""
-    arguments = tyro.cli(UnderShieldArguments, description=__doc__)
-    torch.set_num_threads(1)  # two threads are slower for such small networks
-    trainings = make_trainings(arguments)
-    for training in trainings.values():
-        training.run()
-    return run_study(make_study(trainings, arguments.episodes), arguments)
-
-
-TITLE = "Learning under a shield"
-NOTE = (
-    "`HRCReach-v0`, mean actions. Goals, cost per episode and interventions per hour: interquartile "
-    "mean over the policies of all seeds, with 95 % stratified bootstrap intervals from five seeds "
-    "on. Contacts towards the worker and those above the force limit: of all policies together, "
-    "with exact intervals."
-)
 NOTE_ON_SEEDS = "`HRCReach-v0`, mean actions, one policy in each row; exact intervals of counts."
 COUNT = Column("{}.towards", "contacts towards [episodes]", shows="count", counted=True)
 """Number of contacts towards the worker, of the number of episodes."""

@@ -1,4 +1,4 @@
-"""The study of learners under a shield: its arms, their environments, and the summary over seeds."""
+"""The study of learners under a shield: its arms, their environments, the summary over seeds."""
 
 from pathlib import Path
 
