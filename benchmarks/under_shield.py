@@ -2,8 +2,8 @@
 
     python -m benchmarks.under_shield
 
-PPO is trained under a shield whose change of the command it observes and is penalized for, with
-forecasts of people in the observation: under `qp`, under `ssm` with the walking speed of ISO 13855,
+PPO is trained under a shield, with its changes of the command and forecasts of people in the
+observation and a penalty on these changes: under `qp`, under `ssm` with the walking speed of ISO 13855,
 and under `sara`, which verifies that the robot can brake. Beside these, PPO is trained without
 safety term and shield, and evaluated with and without `qp`, and PPO-Lagrangian is trained with a
 cost limit. Every learner is trained with five seeds and the same number of steps, and all policies

@@ -53,6 +53,7 @@ class RewardConfig:
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
         check_fields(self, "be in [0, 1]", "unknown_closeness")
+        check_fields(self, "not be negative", "shield_change")
 
 
 KINDS = ("dense", "sparse")

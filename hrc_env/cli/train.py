@@ -56,7 +56,7 @@ class Train(TrainingRequest):
         given = [name for name, value in options.items() if value]
         if given and self.shield is None and self.resume is None:
             raise ConfigError(
-                f"{given[0]} requires a shield, whose change of commands is 0 otherwise: add "
+                f"{given[0]} requires a shield, since commands are not changed without one: add "
                 "--shield qp, or leave out the option."
             )
 
