@@ -62,7 +62,7 @@ class Verification:
 
     gap_m: Floats
     """Smallest gap between the reachable sets of robot and people (B,) [m]; negative if they
-    intersect, infinite if nobody is near."""
+    intersect, infinite if no person is near."""
     excess_m_s: Floats
     """Maximum speed above the limit within reach of a person (B,) [m/s]; 0 if the intention is
     verified."""
