@@ -3,11 +3,12 @@
     python -m benchmarks.under_shield
 
 PPO is trained under a shield, with its changes of the command and forecasts of people in the
-observation and a penalty on these changes: under `qp`, under `ssm` with the walking speed of ISO 13855,
-and under `sara`, which verifies that the robot can brake. Beside these, PPO is trained without
-safety term and shield, and evaluated with and without `qp`, and PPO-Lagrangian is trained with a
-cost limit. Every learner is trained with five seeds and the same number of steps, and all policies
-are evaluated on the same seeds, which no training uses.
+observation and a penalty on these changes: under `qp`, under `ssm` with the walking speed of ISO
+13855, and under `sara`, which verifies that the robot can brake. Beside these, PPO is trained
+without safety term and shield, and evaluated with and without `qp`, and PPO-Lagrangian is trained
+with a cost limit. Every learner is trained with five seeds and the same number of steps, and all
+policies are evaluated on the same seeds, which no training uses. CPO is not compared: FSRL, which
+has it, is no dependency of this package (`examples/ppo_lagrangian_fsrl.py` shows its use).
 """
 
 import sys
