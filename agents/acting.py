@@ -14,6 +14,7 @@ from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
 from . import sb3_files
 from .env_info import EnvInfo
+from .interface import read_interface
 
 TRAIN = "python -m hrc_env train"
 Size = int | dict[str, int]
@@ -75,8 +76,14 @@ def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
         beside |= {name: int(np.prod(shape)) for name, shape in images.items()}
     parts: Size = {**beside, FLAT: size} if beside else size
     check_fits(path, meta, parts, env_info.n_actions)
-    made_for = (meta.get("environment") or {}).get("control") or "joint"
-    sb3_files.check_control(path, made_for, env_info)
+    needed = read_interface(meta.get("environment") or {})
+    sb3_files.check_control(path, needed.control or "joint", env_info)
+    if needed.forecast_s != env_info.forecast_s:
+        raise CheckpointError(
+            f"{path} observes forecasts at {needed.forecast_s} s, but this environment has "
+            f"forecast_s={env_info.forecast_s}: create it with the former "
+            f"(--config 'forecast_s={list(needed.forecast_s)}')."
+        )
 
 
 def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
@@ -92,5 +99,5 @@ def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size
         raise CheckpointError(
             f"{path} expects observations {sizes[0]} and actions {sizes[1]}, but this environment "
             f"has {observation} and {action}: create it with the same task, robot, n_workers, "
-            f"control and observe_images ({meta.get('environment')})."
+            f"control, observe_images and config ({meta.get('environment')})."
         )

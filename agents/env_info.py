@@ -56,6 +56,8 @@ class EnvInfo:
     """Number of entries of a goal that is separate from the observation, or 0 if there is none."""
     images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     """Shapes (height, width, channels) of the images in an observation, by name."""
+    forecast_s: tuple[float, ...] = ()
+    """Horizons of the forecasts of the workers' joints in the observation [s]."""
 
     def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
         """Return the terms of an observation by name, in metres, seconds and radians.
@@ -99,4 +101,5 @@ def env_info(env: object) -> EnvInfo:
         task=simulation.task.id,
         map=simulation.scene.map,
         goal_size=0 if simulation.task.goal is None else simulation.task.goal.size,
+        forecast_s=simulation.config.forecast_s,
     )

@@ -61,7 +61,7 @@ def run(request: ExportRequest) -> int:
     make_ready(console, arguments.perception)
     env = HRCVecEnv(1, **arguments.batched_keywords())
     try:
-        info = env_info(env.simulation)
+        info, config = env_info(env.simulation), env.env.config
     finally:
         env.close()
     trained = checkpoints.load(request.run_folder / "policy.zip", info).learner
@@ -79,6 +79,8 @@ def run(request: ExportRequest) -> int:
         command=format_command(arguments), seed=arguments.seed, timesteps=trained.num_timesteps,
         hrc_env=__version__, commit=record.get("git"), sha256=hashlib.sha256(content).hexdigest(),
         worth=tuple(_evaluate(network, shield, request, kwargs, console) for shield in shields),
+        forecast_s=config.forecast_s, uncertainty=config.uncertainty,
+        observe_shield=config.observe_shield,
     )  # fmt: skip
     write_whole(path, content)
     write_whole(path.with_suffix(".json"), json.dumps(asdict(card), indent=1))

@@ -20,6 +20,7 @@ from hrc_env.tasks.goal import ACHIEVED, DESIRED
 from hrc_env.tasks.task import ancestor_of
 
 from .env_info import EnvInfo
+from .interface import Interface
 from .network import Architecture, Network
 
 PREFIX, SUFFIX = "hrc://", ".safetensors"
@@ -86,6 +87,22 @@ class Card:
     """SHA-256 digest of the weights file."""
     worth: tuple[Worth, ...]
     """Scores from the evaluations of the export, one entry for each shield."""
+    forecast_s: tuple[float, ...] = ()
+    """Horizons of the forecasts in the observation [s]."""
+    uncertainty: tuple[str, ...] = ()
+    """Entries of the observation for the covariance of each joint (`HRCConfig.uncertainty`)."""
+    observe_shield: bool = False
+    """Whether the observation contains the change of the last command by the shield."""
+
+    @property
+    def interface(self) -> Interface:
+        """Settings of an environment that the policy needs."""
+        return Interface(
+            control=self.control,
+            forecast_s=self.forecast_s,
+            uncertainty=self.uncertainty,
+            observe_shield=self.observe_shield,
+        )
 
 
 class Policy(NamedTuple):
@@ -178,6 +195,7 @@ def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
             ("task", card.task, ancestor_of(env_info.task, [card.task])),
             ("control", card.control, env_info.control),
             ("number of actions", card.n_actions, env_info.n_actions),
+            ("forecast_s", card.forecast_s or env_info.forecast_s, env_info.forecast_s),
         )
         if theirs != ours
     ]

@@ -9,6 +9,7 @@ from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 from . import experts, policies, random
 from .env_info import Agent, EnvInfo
+from .interface import Interface, read_interface
 from .scripted import Yielding
 
 AGENTS = ("random", "scripted", "scripted_slowed")
@@ -85,18 +86,23 @@ def is_policy(name: str) -> bool:
     return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
-def find_control(name: str) -> str | None:
-    """Return the `control` with which a policy was trained, or None if it is unspecified."""
+def find_interface(name: str) -> Interface:
+    """Return the settings of an environment that an agent's file states to be necessary."""
     check_agent(name)
     if is_policy(name):
-        return policies.read(policies.find_path(name)).card.control
+        return policies.read(policies.find_path(name)).card.interface
     if not is_checkpoint(name):
-        return None
+        return Interface()
     from . import acting
 
     if meta := acting.read_meta(Path(name)):
-        return meta.get("environment", {}).get("control")
-    return acting.sb3_files.read_control(Path(name))
+        return read_interface(meta.get("environment") or {})
+    return Interface(control=acting.sb3_files.read_control(Path(name)))
+
+
+def find_control(name: str) -> str | None:
+    """Return the `control` with which a policy was trained, or None if it is unspecified."""
+    return find_interface(name).control
 
 
 def find_function(name: str) -> Callable[..., Any]:

@@ -54,6 +54,15 @@ class TrainingRequest(EnvironmentArguments):
     """Weight of the reward's penalty for proximity to estimated workers; 0 disables it (default: 2,
     or 0 with a cost limit).
     """
+    observe_shield: bool = False
+    """Observe the change of the last command by the shield; needs --shield."""
+    forecast_s: tuple[float, ...] = ()
+    """Observe forecasts of the workers' joints at these horizons, each in (0, 1] [s], e.g. 0.2 0.4.
+    """
+    shield_change: float | None = None
+    """Weight of the reward's penalty on the change of the command by the shield: its mean square,
+    relative to the fastest joint velocities (default: 0); needs --shield.
+    """
     ramp: int = 400_000
     """Environment steps over which the proximity weight grows from 0, or the cost limit tightens,
     to learn the task first. With 0, both are constant: the policy learns several times slower, but
@@ -71,8 +80,14 @@ class TrainingRequest(EnvironmentArguments):
     def keywords(self) -> dict[str, Any]:
         """Return the environment's keyword arguments for training and evaluation."""
         given = super().keywords()
-        safety = {} if self.proximity is None else {"reward": {"proximity": self.proximity}}
-        config = merge(safety, given.get("config", {}))
+        weights = {"proximity": self.proximity, "shield_change": self.shield_change}
+        reward = {name: each for name, each in weights.items() if each is not None}
+        asked: dict[str, Any] = {"reward": reward} if reward else {}
+        if self.observe_shield:
+            asked["observe_shield"] = True
+        if self.forecast_s:
+            asked["forecast_s"] = self.forecast_s
+        config = merge(asked, given.get("config", {}))
         threads = {} if self.perception == "pixels" else {"num_threads": self.threads}
         return {**given, "config": config, **threads}
 

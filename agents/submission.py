@@ -16,7 +16,8 @@ from hrc_env import __version__
 from hrc_env.core.errors import ConfigError
 
 from . import policies
-from .registry import AGENTS, check_agent, find_control, is_checkpoint, is_policy
+from .interface import Interface
+from .registry import AGENTS, check_agent, find_interface, is_checkpoint, is_policy
 
 MOST_BYTES = 1 << 29
 """Maximum size of all files of a policy [bytes]."""
@@ -32,8 +33,8 @@ class Submission:
     """The same for a process that has the files in its working directory."""
     files: Mapping[str, bytes] = field(default_factory=dict[str, bytes], repr=False)
     """Content of the files by path; empty for an agent without files."""
-    control: str | None = None
-    """Control mode that a file of the policy contains, or None."""
+    interface: Interface = field(default_factory=Interface)
+    """Settings of an environment that a file of the policy states to be necessary."""
 
     @property
     def sha256(self) -> str:
@@ -73,14 +74,14 @@ def read_submission(policy: str, beside: Path | None = None) -> Submission:
     if policy not in AGENTS and ":" in policy and not is_file:
         return Submission(policy, policy, _read_module(policy, beside))
     check_agent(policy)
-    control = find_control(policy)
+    interface = find_interface(policy)
     if policy in AGENTS:
         return Submission(policy, policy)
     path = policies.find_path(policy)
     paths = (path, path.with_suffix(".json")) if is_policy(policy) else (path,)
     files = {each.name: _read(each) for each in paths}
     return Submission(policy, policy if policy.startswith(policies.PREFIX) else path.name, files,
-                      control)  # fmt: skip
+                      interface)  # fmt: skip
 
 
 def _read_module(policy: str, beside: Path | None) -> dict[str, bytes]:

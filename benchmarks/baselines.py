@@ -132,7 +132,10 @@ def make_study(trainings: Mapping[tuple[str, str], Training]) -> Study:
         first_seed=EVALUATION_SEED,
         rows=rows,
         columns=COLUMNS,
-        tables=(Table("baselines", "Baselines", shown, COLUMNS, ("perception", "agent"), NOTE),),
+        tables=(
+            Table("baselines", "Baselines", shown, COLUMNS, ("perception", "agent"), NOTE,
+                  trained=[name for name in shown if name.split(".")[1] in PPO]),
+        ),
         conditions=Conditions(
             people="`attentive`", scene="`lab`", perception="in the rows", worker="worker_1",
             chosen_on="policies were trained on seed 0",

@@ -5,7 +5,8 @@
 For each seed, PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For
 PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept, based on the
 true cost of the exploring policy in windows of 250,000 steps (1,000 episodes). Both policies are
-evaluated on the same fixed seeds; the policy of PPO is also evaluated with a shield.
+evaluated on the same fixed seeds; the policy of PPO is also evaluated with a shield. Learners are
+compared by the interquartile mean over all seeds with its stratified bootstrap interval.
 """
 
 import json
@@ -22,20 +23,14 @@ import tyro
 
 from benchmarks.command import StudyArguments, run_study
 from benchmarks.common import make_exact
-from benchmarks.learning import Training
+from benchmarks.learning import SAFETY_OF_POLICY, Training, summarize_runs
 from hrc_env.agents.callbacks import Curve
 from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
-from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT
-from hrc_env.experiments.columns import (
-    Column,
-    interventions,
-    mean,
-    per_minute,
-    rate,
-    share_above_force_limit,
-)
+from hrc_env.evaluation.intervals import MIN_RUNS
+from hrc_env.evaluation.sums import COST_UNIT
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Table, format_seeds
 from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import Row, Study
@@ -77,7 +72,7 @@ class LimitedArguments(StudyArguments):
 
     out: Path = Path("out/limited")
     """Folder for the runs, results.json and the report."""
-    seeds: tuple[int, ...] = (0, 1, 2)
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """Seeds of environments and learner."""
     cost_limit: float = 30.0
     """Maximum mean cost of an episode."""
@@ -106,8 +101,10 @@ def make_trainings(arguments: LimitedArguments) -> Trainings:
 def make_study(trainings: Trainings, limit: float) -> Study:
     """Return the study of the trained policies."""
     rows, shown = dict[str, Row](), dict[str, tuple[str, ...]]()
+    of_learner = {learner: list[str]() for learner in WORDS}
     seeds = list(dict.fromkeys(seed for _, seed in trainings))
     for learner, (words, shield) in WORDS.items():
+        shown[learner] = (words, "all")
         for seed in seeds:
             policy = trainings["limited" if learner == "limited" else "fast", seed].policy
             name, cells = name_row(learner, seed), (words, str(seed))
@@ -115,6 +112,7 @@ def make_study(trainings: Trainings, limit: float) -> Study:
             if policy.exists():
                 env = {"shield": shield, "config": {"worker": WORKER}}
                 rows[name] = Row(cells, 1000, str(policy), env=env)
+                of_learner[learner].append(name)
     return Study(
         name="limited",
         title=TITLE,
@@ -122,9 +120,12 @@ def make_study(trainings: Trainings, limit: float) -> Study:
         depends=("env", "tracker", "emulator", "motion", "shield", "agents"),
         first_seed=EVALUATION_SEED,
         rows=rows,
-        columns=MEASURED,
-        tables=(Table("limited", TITLE, shown, COLUMNS, ("learner", "seed"), NOTE),),
-        derive=partial(judge_limits, trainings=trainings, limit=limit),
+        columns=SAFETY_OF_POLICY,
+        tables=(
+            Table("limited", TITLE, shown, COLUMNS, ("learner", "seed"), NOTE, fewest=MIN_RUNS,
+                  trained=[name for name in shown if name not in WORDS]),
+        ),
+        derive=partial(judge, rows=of_learner, trainings=trainings, limit=limit),
         conditions=Conditions(
             people="`attentive`", scene="`lab`", perception="`keypoints`",
             chosen_on=f"policies were trained on seeds {', '.join(map(str, seeds))}, with the body "
@@ -143,9 +144,15 @@ def name_row(learner: str, seed: int) -> str:
     return f"fast_{seed}.{'qp' if learner == 'fast' else 'none'}"
 
 
-def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[str, Metric]:
+def judge(
+    metrics: Metrics, rows: Mapping[str, list[str]], trainings: Trainings, limit: float
+) -> dict[str, Metric]:
+    """Summarize the policies of each learner, and judge how closely limits were kept."""
+    return {**summarize_runs(metrics, rows), **judge_limits(trainings, limit)}
+
+
+def judge_limits(trainings: Trainings, limit: float) -> dict[str, Metric]:
     """Compute from the learning curves how closely each PPO-Lagrangian run kept its limit."""
-    del metrics
     return {
         f"limited_{seed}.{name}": metric
         for (learner, seed), training in trainings.items()
@@ -202,27 +209,17 @@ def main() -> int:
     return run_study(make_study(trainings, arguments.cost_limit), arguments)
 
 
-PER_HOUR = 0.36
-"""Factor from contacts in 1,000 episodes of 10 s to contacts per hour."""
 NOTE = (
-    "`HRCReach-v0`; 1,000 episodes with the policy's mean actions, 95 % intervals, exact for "
-    "contacts and those above the force limit of the touched body region. Interventions: times "
-    "that the shield becomes active, per hour. Cost in training: of exploring actions, over the "
-    "last two windows of 1,000 episodes (smallest to largest). Greatest deviation: of one of these "
-    "windows from the limit."
-)
-MEASURED = (
-    per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),
-    mean("cost", "cost", "cost_per_episode"),
-    rate("contacts_towards", "contacts towards [1/h]", "towards", "1000 episodes", scale=PER_HOUR),
-    share_above_force_limit(),
-    interventions(),
-    mean("r", name="return"),
-    rate("contacts", name="contacts_per_episode"),
+    "`HRCReach-v0`; 1,000 episodes of each policy with its mean actions. All seeds: interquartile "
+    "mean of goals, cost and interventions per hour over the policies, with 95 % stratified "
+    "bootstrap intervals from five seeds on; contacts towards and above the force limit of the "
+    "touched body region of all policies together, with exact intervals. Cost in training: of "
+    "exploring actions, median of the last two windows of 1,000 episodes. Greatest deviation: of "
+    "one of these windows from the limit."
 )
 COLUMNS: tuple[Any, ...] = (
-    *(column for column in MEASURED if column.heading),
-    Column("{}.learning.cost", "cost in training"),
+    *(column for column in SAFETY_OF_POLICY if column.heading),
+    Column("{}.learning.cost", "cost in training", plain=True),
     Column("{}.learning.reached_at_steps", "limit reached after [steps]", 0, plain=True),
     Column("{}.learning.furthest", "greatest deviation [%]", 0, 100, plain=True),
 )

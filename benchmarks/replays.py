@@ -119,6 +119,7 @@ REPLAYS: dict[str, Replay] = {
     "experts": _replay_command("experts"),
     "learners": _replay_command("learners", learnt=(".policy_",)),
     "limited": _replay_command("limited", learnt=("",)),
+    "under_shield": _replay_command("under_shield", learnt=("",)),
     "kept": _replay_command("kept", row_words=3),
     "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(partial(_replay_price, "price"), row_words=2),

@@ -215,6 +215,12 @@ STUDIES: dict[str, Study] = {
         ),
     }),
     "shield_and_price": Study({
+        "under_shield": Command(
+            "python -m benchmarks.under_shield", 560, (*KEYPOINTS, "shield", "agents"),
+            (),  # its two tables are listed with the results of its first run
+            quick="--quick --seeds 0 --learners qp bare", is_release=True,
+            made=ExperimentSource("benchmarks.under_shield", "make_default", needs_out=True),
+        ),
         "shielded": Command(
             "python -m benchmarks.shielded", 6, (*KEYPOINTS, "shield", "agents"), ("shielded",),
             made=ExperimentSource("benchmarks.shielded", "STUDY"),

@@ -586,10 +586,15 @@ constraint is violated. A robot that stands still can be touched by people who d
 the arm can reach in one step. The robot can move around people and away from them. |
 | `"pfl"` | Power and force limiting: as `"qp"`, but contact is permitted at the speed that the \
 region of the body tolerates from this arm and its load. The robot does not move away. |
+| `"sara"` | Reachability: a command is executed if the robot can brake to `contact_speed_m_s`, or \
+less where the region of the body tolerates less, before a person at 1.6 m/s can reach it; \
+otherwise it brakes. After the SARA shield ([arXiv:2205.06311](https://arxiv.org/abs/2205.06311), \
+[2412.10180](https://arxiv.org/abs/2412.10180)), with speeds instead of energies. |
 
 `last_action` in the observation, and effort and smoothness in the reward, refer to the action of
 the agent. With `config={{"observe_shield": True}}` the observation ends with `shield_change`: the
-velocities after the shield less those before it, in the last step. `info` has the same and more
+velocities after the shield less those before it, in the last step; the weight \
+`reward.shield_change` penalizes it. `info` has the same and more
 ([keys](infos.md)), and pictures show an active shield by a red frame. You can also [add a shield of
 your own](../bring_your_own/shield.md).
 
@@ -598,7 +603,7 @@ If people are where they are estimated to be, and move no faster than the settin
 
 - The robot does not move towards a person whose estimated capsules are closer than the margin: the
   bound on the error of the estimate (see below) plus `margin_m`. People may come closer by their
-  own motion: the robot then moves away with `"qp"`, and stops with `"ssm"`.
+  own motion: the robot then moves away with `"qp"`, and stops with `"ssm"` and `"sara"`.
 - The same holds for people without a track, and for floor that no camera has seen empty.
 - Contacts that a task allows happen no faster than the region of the body tolerates.
 

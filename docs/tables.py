@@ -25,7 +25,7 @@ from typing import Any
 from benchmarks.studies import COMMANDS
 from hrc_env.core.results import Metric
 from hrc_env.core.versions import SUBSYSTEMS
-from hrc_env.evaluation.intervals import MIN_SEEDS, estimate_share_of
+from hrc_env.evaluation.intervals import estimate_share_of
 from hrc_env.experiments.report import Metrics, Table, format_table
 from hrc_env.worker.body import ANY
 
@@ -39,7 +39,7 @@ NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end 
 PROVENANCE = re.compile(r"<!-- provenance -->\n.*?<!-- end of provenance -->", re.S)
 EXAMPLE = re.compile(r"<!-- example: (?P<path>[\w/]+\.py) -->\n.*?<!-- end of example -->", re.S)
 EXAMPLES = Path(__file__).parent.parent / "examples"
-RANGES = ("cluster", "learners", "limited", "speed", "speed_organs", "speed_pixels", "speed_tasks",
+RANGES = ("cluster", "speed", "speed_organs", "speed_pixels", "speed_tasks",
           "tracking_cost")  # fmt: skip
 """Tables with the smallest and the largest of several runs instead of intervals."""
 GENERATED = (BLOCK, NUMBER, PROVENANCE, EXAMPLE)
@@ -125,7 +125,7 @@ def _block(found: re.Match[str]) -> str:
 
 
 def withhold_intervals(table: Table, result: Result) -> Metrics:
-    """Return metrics without the intervals of fewer than `MIN_SEEDS` seeds, unless they are exact.
+    """Return metrics without intervals of fewer than `Table.fewest` seeds, unless they are exact.
 
     Results of earlier versions have such intervals, which are bootstraps.
 
@@ -136,7 +136,7 @@ def withhold_intervals(table: Table, result: Result) -> Metrics:
     columns = [column for column in table.columns if column.counted]
     counted = {name for row in table.rows for each in columns for name in each.list_metrics(row)}
     return {
-        name: each if name in counted or each.n >= MIN_SEEDS or is_exact(each)
+        name: each if name in counted or each.n >= table.fewest or is_exact(each)
         else replace(each, low=math.nan, high=math.nan)
         for name, each in result.metrics.items()
     }  # fmt: skip

@@ -93,9 +93,10 @@ class EnvConfig:
     (velocity of the tool) or "twist" (linear and angular velocity of the tool). For a robot with a
     hand, a further entry commands the hand, from -1 (open) to 1 (closed)."""
     shield: "ShieldChoice" = None
-    """Shield that may change a command before the robot executes it: "qp", "ssm", "pfl", a
-    `ShieldConfig` or a mapping such as {"kind": "qp", "margin_m": 0.1} (docs/reference/shields.md),
-    the name of a registered shield, or a function; None for no shield."""
+    """Shield that may change a command before the robot executes it: "qp", "ssm", "pfl", "sara",
+    a `ShieldConfig` or a mapping such as {"kind": "qp", "margin_m": 0.1}
+    (docs/reference/shields.md), the name of a registered shield, or a function; None for no
+    shield."""
     observe_images: "ImageConfig | Mapping[str, Any] | tuple[int, int] | None" = field(
         default=None, metadata=MANY
     )

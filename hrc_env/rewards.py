@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
-from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
+from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape, require
 from hrc_env.core.kernels import kernel
 from hrc_env.core.lending import call_user_function, is_of_user, read_only
 from hrc_env.core.mapping import answer_unknown_fields
@@ -45,10 +45,15 @@ class RewardConfig:
     unknown_closeness: float = 0.25
     """Lower bound on the closeness while a worker is unknown, in [0, 1]. With a positive value,
     losing sight of a worker is not rewarded like being alone."""
+    shield_change: float = 0.0
+    """Weight of the penalty on the mean squared change of the joint velocities by the shield,
+    relative to the fastest ones that an action can command. A policy that learns with a shield
+    then avoids commands that the shield has to change."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
         check_fields(self, "be in [0, 1]", "unknown_closeness")
+        check_fields(self, "not be negative", "shield_change")
 
 
 KINDS = ("dense", "sparse")
@@ -125,6 +130,15 @@ def _proximity(belief: Belief, step: Any, previous: Floats, config: RewardConfig
     return -config.proximity * near
 
 
+def _shield_change(belief: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
+    """Return the negative reward (B,) for changes of the command by the shield."""
+    if config.shield_change == 0.0:
+        return np.zeros(len(belief.action))
+    model = require(belief.model, "The robot's model (RobotModel) for the term shield_change")
+    change = require(belief.shield_change, "The change of the command by the shield")
+    return -config.shield_change * _mean_square(change / model.fastest_rad_s)
+
+
 SHARED_TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "effort",
@@ -144,6 +158,13 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
         "the robot's surface and the closest estimated body and d0 is `proximity_reach_m`; while a "
         "worker is unknown, the squared term is at least `unknown_closeness`.",
         _proximity,
+    ),
+    RewardTerm(
+        "shield_change",
+        "Minus `shield_change` times the mean square of the change of the joint velocities by the "
+        "shield, each relative to the fastest velocity that an action can command; 0 without a "
+        "shield.",
+        _shield_change,
     ),
 )
 

@@ -97,6 +97,33 @@ def test_one_environment_of_two_whose_reward_is_not_finite_raises():
     assert sum_terms({"reach": np.ones(2), "effort": np.full(2, 0.5)}, 2).tolist() == [1.5, 1.5]
 
 
+def test_the_term_of_the_shield_is_its_mean_squared_change_of_what_can_be_commanded():
+    """Of the belief, in the step in which it acts; without a weight or a shield it is 0."""
+    arguments = {"perception": "truth", "people": "unaware", "num_threads": 1}
+    weighed = {"reward": {"shield_change": 2.0}}
+    envs = HRCVectorEnv(8, shield="qp", config=weighed, **arguments)
+    free = HRCVectorEnv(8, shield="qp", **arguments)
+    bare = HRCVectorEnv(8, config=weighed, **arguments)
+    for each in (envs, free, bare):
+        each.reset(seed=4)
+    rng, seen = np.random.default_rng(0), []
+    for _ in range(40):
+        action = rng.uniform(-1, 1, envs.action_space.shape).astype(np.float32)
+        *_, infos = envs.step(action)
+        now = envs.simulation.belief
+        share = now.shield_change / now.model.fastest_rad_s
+        np.testing.assert_allclose(
+            infos["reward/shield_change"], -2.0 * np.square(share).mean(1), atol=1e-12
+        )
+        np.testing.assert_allclose(
+            np.linalg.norm(now.shield_change, axis=1), infos["shield/change"], atol=1e-12
+        )
+        seen += infos["reward/shield_change"].tolist()
+        for each in (free, bare):
+            assert (each.step(action)[-1]["reward/shield_change"] == 0).all()
+    assert min(seen) < 0
+
+
 def proximity_of(env, weight):
     """The proximity term of a first step with this weight, and a reach as wide as the room."""
     env.reset(seed=3)

@@ -1,7 +1,7 @@
 """Evaluate an agent over many episodes, on one machine or on a cluster."""
 
 import json
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -63,7 +63,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
         engine, console = self.choose_engine(), Console()
         from hrc_env.agents.registry import (
             check_agent,
-            find_control,
+            find_interface,
             make_agent,
         )  # no simulator for --help
         from hrc_env.core.results import provenance, write_whole
@@ -76,13 +76,14 @@ class Evaluate(EnvironmentArguments, EngineArguments):
             from hrc_env.agents.submission import read_submission
 
             submission = read_submission(self.agent)
-            make, control = SeparateProcess(submission, self.trust), submission.control
+            make = SeparateProcess(submission, self.trust)
+            interface = submission.interface
         else:
             check_agent(self.agent)
             make = partial(make_agent, carried(self.agent), trust=self.trust)
-            control = find_control(self.agent)
+            interface = find_interface(self.agent)
         make_ready(console, self.perception)
-        keywords = replace(self, control=self.control or control).keywords()
+        keywords = interface.complete(self.keywords())
         with Meter(console, "episodes", self.episodes, "episodes") as meter:
 
             def tick(share: float) -> None:

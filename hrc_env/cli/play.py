@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,17 +49,20 @@ class Play(EnvironmentArguments):
     viewer: bool = False
     """Show the scene in MuJoCo's interactive viewer (needs a display)."""
 
+    def keywords(self) -> dict[str, Any]:
+        """Return the environment's keyword arguments, completed by those that the agent needs."""
+        from hrc_env.agents.registry import find_interface  # here: --help imports no simulator
+
+        return find_interface(self.agent).complete(super().keywords())
+
     def run(self) -> int:
         """Play the episodes; return the exit status."""
         check_names("environment", [self.task], hrc_env.IDS)
         check_at_least("--episodes", self.episodes, 1)
         check_at_least("--seed", self.seed, 0)
-        from hrc_env.agents.registry import find_control  # here: --help imports no simulator
-
-        arguments = replace(self, control=self.control or find_control(self.agent))
         if self.video is not None:
             check_writable_file(self.video, ".mp4", "--video")
-            film_agent(arguments, self.agent, self.video, trust=self.trust)
+            film_agent(self, self.agent, self.video, trust=self.trust)
             return 0
         import gymnasium
 
@@ -67,7 +70,7 @@ class Play(EnvironmentArguments):
         from hrc_env.evaluation.episodes import summarize
 
         make_ready(Console(), self.perception)
-        with closing(gymnasium.make(self.task, **arguments.keywords())) as env:
+        with closing(gymnasium.make(self.task, **self.keywords())) as env:
             seeds = range(self.seed, self.seed + self.episodes)
             episodes = [self._play(env, seed) for seed in seeds]
         for name, metric in summarize(episodes).metrics().items():

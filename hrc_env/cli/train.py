@@ -30,12 +30,13 @@ class Train(TrainingRequest):
 
         for name in ("num_envs", "threads", "episodes"):
             check_at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
-        for name in ("seed", "proximity", "ramp", "demonstrations"):
-            check_at_least(f"--{name}", getattr(self, name), 0)
+        for name in ("seed", "proximity", "shield_change", "ramp", "demonstrations"):
+            check_at_least(f"--{name.replace('_', '-')}", getattr(self, name), 0)
         mine = fill_in(self)
         check_at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
         _check_limit(self.cost_limit, mine.algorithm)
+        self._check_shield()
         if self.her and mine.algorithm != "sac":
             raise ConfigError(
                 f"--her relabels the goals in a replay buffer, but {mine.algorithm} has no replay "
@@ -48,6 +49,16 @@ class Train(TrainingRequest):
             self.resume or self.out, "--out" if self.resume is None else "--resume"
         )
         return training.run(self)
+
+    def _check_shield(self) -> None:
+        """Raise `ConfigError` for an option about the shield without a shield."""
+        options = {"--observe-shield": self.observe_shield, "--shield-change": self.shield_change}
+        given = [name for name, value in options.items() if value]
+        if given and self.shield is None and self.resume is None:
+            raise ConfigError(
+                f"{given[0]} requires a shield, since commands are not changed without one: add "
+                "--shield qp, or leave out the option."
+            )
 
     def _check_engine(self, algorithm: str) -> None:
         """Raise `ConfigError` for options that the engine does not support."""

@@ -27,6 +27,9 @@ Numbers = Sequence[float] | Floats
 MIN_SEEDS = 8
 """Smallest number of seeds with a bootstrap interval or a p-value. With fewer, percentile intervals
 are far too narrow."""
+MIN_RUNS = 5
+"""Smallest number of training runs of a learner with an interval of their interquartile mean, as in
+Agarwal et al. 2021 (arXiv:2108.13264). With fewer, there is none."""
 N_FLIPS = (4_000, 40_000)
 """Numbers of random swaps in a permutation test. The second is used if the first p-value is below
 `CLOSER_P`, as a p-value that is adjusted for many contrasts must be known more closely (sequential
@@ -128,17 +131,20 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
     return make_percentile_metric(point, drawn, unit, n)
 
 
-def make_percentile_metric(point: float, drawn: Floats, unit: str, n: int) -> Metric:
+def make_percentile_metric(
+    point: float, drawn: Floats, unit: str, n: int, fewest: int = MIN_SEEDS
+) -> Metric:
     """Return a statistic with the central 95 % interval of its values in resamples.
 
     Args:
         point: value of the statistic.
         drawn: values (R,) in resamples of the seeds; NaN where the statistic is undefined.
         unit: unit of the statistic.
-        n: number of seeds; if it is below `MIN_SEEDS`, the ends of the interval are NaN.
+        n: number of seeds.
+        fewest: number of seeds below which the ends of the interval are NaN.
     """
     drawn = drawn[~np.isnan(drawn)]
-    if n < MIN_SEEDS or np.isnan(point) or not drawn.size or not np.isfinite(drawn).all():
+    if n < fewest or np.isnan(point) or not drawn.size or not np.isfinite(drawn).all():
         return Metric(point, np.nan, np.nan, unit, n)
     low, high = np.quantile(drawn, [0.025, 0.975])
     return Metric(point, float(low), float(high), unit, n)
@@ -524,6 +530,34 @@ def estimate_iqm(values: Numbers, unit: str) -> Metric:
         return stats.trim_mean(drawn, 0.25, axis=1)
 
     return bootstrap(iqm, len(x), unit)
+
+
+def estimate_run_iqm(scores: Sequence[Numbers], unit: str, n_draws: int = 4000) -> Metric:
+    """Return the interquartile mean of a learner's scores over training runs, with its interval.
+
+    The scores of all tasks are trimmed together. The 95 % interval is a stratified bootstrap, which
+    resamples runs within each task (Agarwal et al. 2021, arXiv:2108.13264). It describes the
+    variation between trainings, which intervals over the episodes of one policy do not contain.
+
+    Args:
+        scores: scores (n,) of the training runs of each task, one number per run; a run without a
+            finite score is ignored.
+        unit: unit of the scores.
+        n_draws: number of resamples.
+
+    Returns:
+        The interquartile mean; `Metric.n` is the smallest number of runs of a task. The interval is
+            NaN if that is below `MIN_RUNS`.
+    """
+    tasks = [_keep_finite(_check_column("scores", each))[0] for each in scores]
+    n = min((len(each) for each in tasks), default=0)
+    if n == 0:
+        return Metric(np.nan, np.nan, np.nan, unit, 0)
+    point = float(stats.trim_mean(np.concatenate(tasks), 0.25))
+    rng = np.random.default_rng(0)
+    picked = [each[rng.integers(0, len(each), (n_draws, len(each)))] for each in tasks]
+    drawn: Floats = stats.trim_mean(np.hstack(picked), 0.25, axis=1)
+    return make_percentile_metric(point, drawn, unit, n, MIN_RUNS)
 
 
 def estimate_quantile(values: Sequence[Numbers], q: float, unit: str) -> Metric:

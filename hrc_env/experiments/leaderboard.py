@@ -127,8 +127,8 @@ class Plan:
         for task in self.ids:
             find_task(task)
         agent = SeparateProcess(self.submission, self.trust, must_confine=self.salt is not None)
-        control = self.control or self.submission.control
-        env = {} if control is None else {"control": control}
+        given = {} if self.control is None else {"control": self.control}
+        env = self.submission.interface.complete(given)
         rows = {
             f"{task}.{name}": Row(
                 each.words, self.n, agent, setup=SETUPS[each.setup][1],

@@ -99,6 +99,12 @@ class Table:
     """Values that other publications report, by the names of the corresponding metrics."""
     conditions: Conditions | None = None
     """Conditions of a safety study, which the note names; None for other studies."""
+    trained: Collection[Key] = ()
+    """Rows of single trained policies, in a table that compares learners. They have intervals only
+    of counts of rare events: a bootstrap over the episodes of one policy does not contain the
+    variation between trainings (`hrc_env.evaluation.intervals.estimate_run_iqm`)."""
+    fewest: int = MIN_SEEDS
+    """Smallest number of seeds with a bootstrap interval; `MIN_RUNS` if a seed is a training."""
 
     def check(self, known: Collection[str]) -> None:
         """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.
@@ -172,7 +178,9 @@ class Table:
         ]
         sentences = []
         if any(has_no_interval(metrics[name]) for _, name in shown):
-            sentences.append(TOO_FEW_SEEDS)
+            sentences.append(TOO_FEW_SEEDS.format(self.fewest))
+        if any(row in self.rows for row in self.trained):
+            sentences.append(ONE_TRAINING)
         tested = [name_adjusted(name) for column, name in shown if column.signed and column.marked]
         known = [metrics[name] for name in tested if name in metrics]
         if any(math.isfinite(each.value) for each in known):
@@ -200,6 +208,21 @@ class Table:
         conditions = "" if self.conditions is None else self.conditions.words
         return " ".join(filter(None, (self.note.format(n=n, **numbers), conditions)))
 
+    def drop_bootstraps(self, metrics: Metrics) -> Metrics:
+        """Return the metrics without intervals that `trained` excludes.
+
+        Args:
+            metrics: metrics by name.
+        """
+        columns = [column for column in self.columns if not column.counted]
+        names = {
+            name for row in self.trained for each in columns for name in each.list_metrics(row)
+        }
+        return {
+            name: replace(each, low=each.value, high=each.value) if name in names else each
+            for name, each in metrics.items()
+        }
+
     def to_markdown(self, metrics: Metrics, intervals: bool = True) -> str:
         """Return the table in Markdown with its title and note; rows without numbers are left out.
 
@@ -211,7 +234,7 @@ class Table:
             The table, or "" if no row has a number.
         """
         known = {name: Metric(value, value, value, "", 1) for name, value in self.printed.items()}
-        known |= metrics
+        known |= self.drop_bootstraps(metrics)
         columns = (
             self.columns if intervals else [replace(c, plain=not c.counted) for c in self.columns]
         )
@@ -220,7 +243,7 @@ class Table:
             return ""
         heads = (*self.heads, *(each.heading for each in columns))
         text = format_table(heads, lines, len(self.heads))
-        shown = replace(self, columns=columns).describe_intervals(metrics)
+        shown = replace(self, columns=columns).describe_intervals(known)
         note = " ".join(filter(None, (self.format_note(metrics), shown)))
         return "\n\n".join(filter(None, (f"**{self.title}**", text, note)))
 
@@ -291,10 +314,14 @@ def describe_quick_run(
 MAX_DIGITS = 6
 """Largest number of decimals to which small numbers extend a table's."""
 TOO_FEW_SEEDS = (
-    f"Cells without an interval have too few seeds (fewer than {MIN_SEEDS}), or resamples of the "
-    "seeds without a finite value."
+    "Cells without an interval have too few seeds (fewer than {}), or resamples of the seeds "
+    "without a finite value."
 )
-"""Sentence below tables with numbers from too few seeds."""
+"""Sentence below tables with numbers from too few seeds, with a placeholder for `Table.fewest`."""
+ONE_TRAINING = (
+    "Rows of a single trained policy have intervals only of counted events, over its episodes."
+)
+"""Sentence below tables with rows of single trained policies."""
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
 _TABLE = re.compile(r"^\|---", re.M)
 _DOT_SENTENCE = re.compile(r" ?A dot marks [^\n]*? of the study\.")

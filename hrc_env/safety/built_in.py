@@ -1,6 +1,7 @@
 """The built-in shields, which limit joint velocities by the constraints of `safety.constraints`.
 
-"ssm" scales all joint velocities by one factor, which preserves the path. "qp" and "pfl" select the
+"sara" executes or refuses a command as a whole (`safety.reachability`). "ssm" scales all joint
+velocities by one factor, which preserves the path. "qp" and "pfl" select the
 nearest velocities that the arm can reach within a step. A constraint that requires a retreat is
 split into two: a constraint against approaching, with a very large weight, and a constraint to
 retreat. With a single constraint, an arm that retreats from one hand would push its wrist into the
@@ -17,7 +18,7 @@ other people and parts of the body are unchanged.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -51,6 +52,14 @@ from hrc_env.safety.constraints import (
 )
 from hrc_env.safety.contact import CAPSULE_REGIONS, permitted_contact_speed
 from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, find_support
+from hrc_env.safety.reachability import (
+    STANDSTILL_M_S,
+    Sweep,
+    Verification,
+    brake,
+    sweep_path,
+    verify_sweep,
+)
 from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
@@ -102,6 +111,8 @@ def limit_command(
     Raises:
         ConfigError: the belief lacks the `RobotModel` or the current command.
     """
+    if config.kind == "sara":
+        return execute_verified(belief, velocities, dt_s, config)
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
     found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
     limit = partial(limit_speed, pose.frames, pose.model.chain.slides, pose.links,
@@ -119,6 +130,56 @@ def limit_command(
         "unknown": unknown.any(1).astype(float),
     }
     return ShieldOutput(allowed, values)
+
+
+def execute_verified(
+    belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
+) -> ShieldOutput:
+    """Return the given joint velocities where they are verified; the other robots brake.
+
+    See `limit_command`. "clearance_m" is the smallest gap between the reachable sets, and "slack"
+    the speed of the allowed motion above the limit, where people can be.
+    """
+    pose, undetected = describe_pose(belief), find_undetected(belief, config)
+    model, command = pose.model, require(belief.command, "The current command of the joints")
+    params = config.make_params()
+    bodies = describe_bodies(belief, pose, undetected.is_lost, config, params.bounds)
+    limit = partial(limit_speed, pose.frames, model.chain.slides, pose.links,
+                    belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
+    hold_s, change = max(config.reaction_s, dt_s), model.slew_rad_s2 * dt_s
+
+    def verify(intended: JointVelocities) -> Verification:
+        reached = np.clip(intended, command - change, command + change)
+        sweep = sweep_path(belief.robot, model, pose.links, reached, hold_s)
+        found = verify_sweep(sweep, bodies, params, config.latency_s)
+        near = _is_near_unseen_floor(belief, sweep, config)
+        fastest = np.where(near, sweep.speed_m_s.max((1, 2)) - STANDSTILL_M_S, 0.0)
+        return replace(found, excess_m_s=np.maximum(found.excess_m_s, fastest))
+
+    wanted = velocities.copy()
+    limit(wanted)
+    found = verify(wanted)
+    is_verified = found.excess_m_s <= 0.0
+    allowed = np.where(is_verified[:, None], wanted, brake(command, model, dt_s))
+    limit(allowed)
+    slack = found.excess_m_s if is_verified.all() else verify(allowed).excess_m_s
+    unknown = belief.estimate.unknown | undetected.is_lost
+    values = {
+        "clearance_m": np.where(np.isinf(found.gap_m), np.nan, found.gap_m),
+        "slack": slack,
+        "unknown": unknown.any(1).astype(float),
+    }
+    return ShieldOutput(allowed, values)
+
+
+def _is_near_unseen_floor(belief: Belief, sweep: Sweep, config: ShieldConfig) -> Bools:
+    """Return whether people on unobserved floor can reach a robot before it stands still (B,)."""
+    floor = belief.unseen
+    if floor is None:
+        return np.zeros(len(sweep.until_s), bool)
+    path_m = (sweep.radii_m - belief.robot.capsule_radius_m).sum(1).max(1) * 2.0
+    walked_m = WALKING_M_S * (floor.age_s + sweep.until_s[:, -1] + config.latency_s)
+    return floor.possible_m < path_m + walked_m + HAND_M
 
 
 def describe_pose(belief: Belief) -> ArmPose:
@@ -242,11 +303,13 @@ class AllowedTouches:
 
 
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the allowed touches: all touches for "pfl", otherwise those that the task permits."""
+    """Return the allowed touches: all for "pfl" and "sara", otherwise those of the task."""
     model, links = pose.model, pose.links
     shape = (*belief.estimate.tracked.shape, len(CAPSULES))
-    if config.kind == "pfl":
-        allowed, capsule_m_s = np.ones(shape, bool), np.full(len(links), np.inf)
+    if config.kind in ("pfl", "sara"):
+        allowed = np.ones(shape, bool)
+        most_m_s = np.inf if config.kind == "pfl" else config.contact_speed_m_s
+        capsule_m_s = np.full(len(links), most_m_s)
     elif belief.allowed_contact is None:
         return AllowedTouches(np.zeros(shape), np.zeros(len(links)))
     else:

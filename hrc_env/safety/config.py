@@ -11,10 +11,11 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_fields, check_names
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry.enclosure import CAPSULES, load_enclosure
 from hrc_env.safety.error_bounds import ErrorBounds, load_error_bounds, make_no_bounds
 
-KINDS = ("qp", "ssm", "pfl")
+KINDS = ("qp", "ssm", "pfl", "sara")
 MARGINS = ("constant", "conformal")
 """Values of `ShieldConfig.margin`."""
 MAY_BE_NEGATIVE = ("margin_m", "hand_margin_m")
@@ -88,7 +89,9 @@ class ShieldConfig:
     kind: str = "qp"
     """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
     "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
-    the speed that the touched region of the body tolerates."""
+    the speed that the touched region of the body tolerates. "sara" executes a command only if the
+    robot can stop before its reachable set meets that of a person (`safety.reachability`), and
+    brakes otherwise."""
     margin: str = "conformal"
     """Margin for the error of the estimate. "conformal" is a calibrated quantile of the error
     (`safety.error_bounds`), or the constant margin for parts of the body to which the calibration
@@ -147,7 +150,8 @@ class ShieldConfig:
     contact_speed_m_s: float = 0.25
     """Maximum speed of the robot's hand and its load towards segments of the body that may touch
     them in a task such as a handover (`Task.allowed_contact`) [m/s]. It is further limited to the
-    speed that the region of the body tolerates; 0 forbids touches."""
+    speed that the region of the body tolerates; 0 forbids touches. With "sara", the maximum speed
+    of every link where a person can be; 0 requires standstill."""
     creep_m_s: float = 0.02
     """Speed at which other links may approach these segments even if the clearance permits less
     [m/s]. It permits the small corrections that hold an object in position during a handover."""
@@ -208,5 +212,6 @@ PRESETS = {
     "ssm": ShieldConfig("ssm"),
     "qp": ShieldConfig("qp"),
     "pfl": ShieldConfig("pfl", max_retreat_m_s=0.0),
+    "sara": ShieldConfig("sara", worker_speed_m_s=WALKING_M_S),
 }
 """Settings of the built-in shields, by the names that the argument `shield` accepts."""

@@ -8,6 +8,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.intervals import (
+    MIN_RUNS,
     MIN_SEEDS,
     adjust_holm,
     adjust_metrics,
@@ -18,11 +19,37 @@ from hrc_env.evaluation.intervals import (
     estimate_mean,
     estimate_rate_ratio,
     estimate_ratio,
+    estimate_run_iqm,
     estimate_share_of,
     make_ratio,
 )
 
 FEW = range(1, MIN_SEEDS)
+
+
+def test_the_interquartile_mean_of_runs_is_that_of_all_tasks_and_resamples_within_each():
+    """As rliable computes it: runs of each task are resampled, and all scores are trimmed."""
+    near, far = np.array([1.0, 2.0, 3.0, 4.0, 50.0]), np.array([10.0, 20.0, 30.0, 40.0, 50.0])
+    one = estimate_run_iqm([near], "1")
+    assert one.value == pytest.approx(3.0)
+    assert (one.n, one.low < 3 < one.high) == (5, True)
+    both = estimate_run_iqm([near, far], "1")
+    assert both.value == pytest.approx(stats.trim_mean([*near, *far], 0.25))
+    fixed = estimate_run_iqm([np.full(5, 1.0), np.full(5, 2.0), np.full(5, 3.0)], "1")
+    assert fixed.low == fixed.value == fixed.high, "strata keep their sizes"
+
+
+@pytest.mark.parametrize("n", range(1, MIN_RUNS))
+def test_fewer_than_five_runs_have_no_interval(n):
+    found = estimate_run_iqm([np.arange(1.0, n + 1)], "1")
+    assert np.isfinite(found.value)
+    assert np.isnan([found.low, found.high]).all()
+    lost = estimate_run_iqm([[*np.arange(4.0), np.nan]], "1")
+    assert (lost.n, lost.value) == (4, 1.5)
+    assert np.isnan(lost.low)
+    assert np.isnan(estimate_run_iqm([[]], "1").value)
+    unequal = estimate_run_iqm([np.arange(9.0), np.arange(float(n))], "1")
+    assert np.isnan(unequal.low), "of the task with the fewest"
 
 
 @pytest.mark.parametrize("n", FEW)
