@@ -9,9 +9,9 @@ other hand.
 A task may allow parts of estimated bodies to touch the robot's hand (`Task.allowed_contact`), such
 as the forearms and hands of a worker who takes a tool. While these approach no faster than their
 region of the body tolerates in a contact with this arm and its load, no link retreats from them,
-which keeps the held object within reach. The last link and its load may touch them at `contact_speed_m_s` at most, if the region
-tolerates the sum of both speeds. Other links may approach at `creep_m_s`. The constraints for all
-other people and parts of the body are unchanged.
+which keeps the held object within reach. The last link and its load may touch them at
+`contact_speed_m_s` at most, if the region tolerates the sum of both speeds. Other links may
+approach at `creep_m_s`. The constraints for all other people and parts of the body are unchanged.
 """
 
 import math

@@ -44,16 +44,14 @@ def is_clamped(
         if is_met(installation.obstacles, g, centre, direction, reach_m):
             return True
     for k in range(len(installation.links)):
-        if installation.links[k] != link:
-            if is_met(installation.robot, k, centre, direction, reach_m):
-                return True
+        is_other = installation.links[k] != link
+        if is_other and is_met(installation.robot, k, centre, direction, reach_m):
+            return True
     return False
 
 
 @kernel
-def is_met(
-    table: Floats, row: int, centre: Vector3, direction: Floats, reach_m: float
-) -> bool:
+def is_met(table: Floats, row: int, centre: Vector3, direction: Floats, reach_m: float) -> bool:
     """Return whether a ray meets a shape of a table within a distance `reach_m` [m]."""
     x = centre.x - table[row, CENTRE]
     y = centre.y - table[row, CENTRE + 1]

@@ -255,7 +255,11 @@ def add_worker_constraints(
         out: receives `J`, `b`, `n_rows` and `clearance_m`; `low` and `high` are left unchanged.
     """
     n_caps, n_segments = robots.capsules.shape[1], bodies.segments.shape[2]
-    rods, limbs, shapes = np.empty((n_caps, 5)), np.empty((n_segments, 5)), np.empty((n_caps, WIDTH))
+    rods, limbs, shapes = (
+        np.empty((n_caps, 5)),
+        np.empty((n_segments, 5)),
+        np.empty((n_caps, WIDTH)),
+    )
     normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
     for e in range(len(robots.capsules)):
         out.n_rows[e], out.clearance_m[e] = 0, np.inf

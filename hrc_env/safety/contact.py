@@ -10,9 +10,9 @@ robot clamps it against something, it cannot: then mu = m_R, v is the speed of t
 the limit is that of a quasi-static contact, half of the transient one. Only the first impact is
 modelled, not the force of a robot that keeps pressing.
 
-Shields and incidents take m_R from the robot's mass matrix (`geometry.inertia`). The standard's rule
-for a fixed-base robot, m_R = M / 2 + m_L with the mass M of its moving parts and its load m_L, is
-`effective_mass`; it knows neither pose nor direction.
+Shields and incidents take m_R from the robot's mass matrix (`geometry.inertia`). For a fixed-base
+robot, the standard has a rule that knows neither pose nor direction (`effective_mass`): m_R = M / 2
++ m_L, with the mass M of its moving parts and that of its load.
 
 `BodyRegion.min_gap_m` is the gap that avoids the crushing of a part of the body (ISO 13854:2017,
 Table 1, as cited in open literature).
