@@ -64,4 +64,4 @@ class RobotModel:
             load_kg: (B,) mass of the load at the tool point [kg].
         """
         matrices = find_mass_matrices(self.chain, self.inertias, frames, load_kg)
-        return np.linalg.inv(matrices)
+        return np.asarray(np.linalg.inv(matrices), float)

@@ -34,7 +34,7 @@ def is_clamped(
 
     Args:
         installation: the fixed shapes and the robot.
-        link: index of the link that pushes, whose capsules are left out.
+        link: index of the link that pushes; its capsules are left out.
         centre: point on the axis of the part that is pushed [m].
         direction: (3,) unit vector of the push.
         reach_m: distance from the centre, the radius of the part plus the minimum gap, within which
