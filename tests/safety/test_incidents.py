@@ -164,7 +164,7 @@ def test_the_head_is_never_to_be_hit():
         (0.42, 0.4, 0.0, True),  # the wall is 9 cm behind the hand
         (0.47, 0.4, 0.0, False),  # 14 cm
         (None, 0.4, 0.0, False),
-        (0.42, 0.0, -1.0, False),  # the hand comes to a robot that stands
+        (0.36, 0.0, -1.0, False),  # the hand comes to a robot that stands
         (0.40, 0.4, -3.0, True),  # the blow of a hand is harder than the wall
     ],
 )
