@@ -53,7 +53,12 @@ from hrc_env.reset_options import ResetOptions
 from hrc_env.rewards import RewardTerm
 from hrc_env.safety import incidents
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.contact import REGIONS, effective_mass, permitted_contact_speed
+from hrc_env.safety.contact import (
+    REGIONS,
+    clamping_force,
+    effective_mass,
+    permitted_contact_speed,
+)
 from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
@@ -585,7 +590,8 @@ constraint is violated. A robot that stands still can be touched by people who d
 | `"qp"` | A quadratic program: the nearest joint velocities that satisfy all constraints and that \
 the arm can reach in one step. The robot can move around people and away from them. |
 | `"pfl"` | Power and force limiting: as `"qp"`, but contact is permitted at the speed that the \
-region of the body tolerates from this arm and its load. The robot does not move away. |
+region of the body tolerates from the effective mass of the arm and its load, which is lower where \
+the region would be clamped. The robot does not move away. |
 | `"sara"` | Reachability: a command is executed if the robot can brake to `contact_speed_m_s`, or \
 less where the region of the body tolerates less, before a person at 1.6 m/s can reach it; \
 otherwise it brakes. After the SARA shield ([arXiv:2205.06311](https://arxiv.org/abs/2205.06311), \
@@ -638,7 +644,12 @@ calibrated, the constant margin holds.
 
 {contact}
 
-Speeds are for a transient contact with an arm of 17 kg moving mass, without a load.
+Speeds are for an effective mass of 8.5 kg: that of an arm of 17 kg moving mass by the standard's
+rule. A region is clamped if something fixed is closer behind it than the gap.
+
+`hrc_env.geometry.inertia`: {inertia}
+
+`hrc_env.safety.clamping`: {clamping}
 
 {regions}
 """
@@ -672,10 +683,15 @@ def shields() -> str:
     regions = [
         (each.name, f"{each.quasi_static_n:g}", f"{each.transient_n:g}" if each.is_touched else "-",
          f"{each.stiffness_n_m / 1e3:g}", f"{each.mass_kg:g}",
-         f"{permitted_contact_speed(each.name, mass_kg):.2f}")
+         f"{permitted_contact_speed(each.name, mass_kg):.2f}",
+         f"{each.is_touched * each.quasi_static_n / clamping_force(each.name, 1.0, mass_kg):.2f}",
+         f"{100 * each.min_gap_m:g}")
         for each in REGIONS.values()
     ]  # fmt: skip
-    heads = ("region", "clamped [N]", "hit [N]", "stiffness [N/mm]", "mass [kg]", "speed [m/s]")
+    heads = (
+        "region", "clamped [N]", "hit [N]", "stiffness [N/mm]", "mass [kg]", "speed [m/s]",
+        "speed, clamped [m/s]", "gap [cm]",
+    )  # fmt: skip
     return SHIELDS.format(
         notice=NOTICE,
         enclosure=_doc("hrc_env.geometry.enclosure"),
@@ -689,6 +705,8 @@ def shields() -> str:
         guard=_doc("hrc_env.safety.built_in"),
         settings=_fields_of(ShieldConfig, "`ShieldConfig`"),
         separation=f"`hrc_env.safety.separation`: {_doc('hrc_env.safety.separation')}",
+        inertia=_doc("hrc_env.geometry.inertia"),
+        clamping=_doc("hrc_env.safety.clamping"),
         contact=f"`hrc_env.safety.contact`: {_doc('hrc_env.safety.contact')}",
         regions=_table(heads, regions),
     )

@@ -185,10 +185,17 @@ ENTRIES: dict[str, Entry] = {
     ),
     "safety/contact_force_ratio": Entry(
         "-",
-        "for a contact that begins: force by ISO/TS 15066, A.3, at the closing speed, with half of "
-        "the robot's moving mass and its load, divided by the transient limit of the body region; "
-        f"for the head, which has no such limit, divided by the quasi-static one; {CAME}",
+        "for a contact that begins: force by ISO/TS 15066, A.3, at the closing speed, with the "
+        "robot's effective mass at the touching point, divided by the transient limit of the body "
+        "region; for the head, which has no such limit, divided by the quasi-static one. If "
+        "`contact_is_clamped`, at least the force at the robot's speed on a part that does not "
+        f"recoil, divided by the quasi-static limit; {CAME}",
         0.0,
+    ),
+    "safety/contact_is_clamped": Entry(
+        "0 or 1",
+        "whether in a contact that begins the robot moves towards a part of a body that cannot "
+        "yield, because a fixed shape or another link of the robot is behind it",
     ),
     "safety/contact_severity": Entry(
         "0 to 3",

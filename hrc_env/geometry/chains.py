@@ -187,7 +187,7 @@ def _write_frames(
 
 
 @kernel
-def _transform_point(frame: Transforms, point: Floats) -> Vector3:
+def transform_point(frame: Transforms, point: Floats) -> Vector3:
     """Transform a point (3,) from a frame with pose (4, 4) to the parent frame [m]."""
     x, y, z = point[0], point[1], point[2]
     return Vector3(
@@ -222,7 +222,7 @@ def _write_jacobian(
     """Compute the Jacobian `out` (B, 3, N) of the tool point; column i belongs to joint i."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
-        point = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
+        point = transform_point(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
             column = lever(frames[b, i], slides[i], point)
             out[b, 0, i], out[b, 1, i], out[b, 2, i] = column.x, column.y, column.z
@@ -240,7 +240,7 @@ def _write_tool_motion(
     """Compute the positions (B, 3) [m] and velocities (B, 3) [m/s] of the tool points."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
-        tool = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
+        tool = transform_point(frames[b, n - 1], link_from_tool[:, 3])
         vx, vy, vz = 0.0, 0.0, 0.0
         for i in range(n):
             x, y, z = lever(frames[b, i], slides[i], tool)
@@ -257,6 +257,6 @@ def _write_capsules(
     for b in range(frames.shape[0]):
         for k in range(len(link)):
             for e in range(2):
-                end = _transform_point(frames[b, link[k]], ends_link[k, e])
+                end = transform_point(frames[b, link[k]], ends_link[k, e])
                 ends_world[b, k, e, 0], ends_world[b, k, e, 1] = end.x, end.y
                 ends_world[b, k, e, 2] = end.z

@@ -9,11 +9,10 @@ other hand.
 
 A task may allow parts of estimated bodies to touch the robot's hand (`Task.allowed_contact`), such
 as the forearms and hands of a worker who takes a tool. While these approach no faster than their
-region of the body tolerates in a contact with this arm and its load
-(`contact.permitted_contact_speed`), no link retreats from them, which keeps the held object within
-reach. The last link and its load may touch them at `contact_speed_m_s` at most, if the region
-tolerates the sum of both speeds. Other links may approach at `creep_m_s`. The constraints for all
-other people and parts of the body are unchanged.
+region of the body tolerates in a contact with this arm and its load, no link retreats from them,
+which keeps the held object within reach. The last link and its load may touch them at
+`contact_speed_m_s` at most, if the region tolerates the sum of both speeds. Other links may
+approach at `creep_m_s`. The constraints for all other people and parts of the body are unchanged.
 """
 
 import math
@@ -50,7 +49,11 @@ from hrc_env.safety.constraints import (
     add_floor_constraints,
     add_worker_constraints,
 )
-from hrc_env.safety.contact import CAPSULE_REGIONS, permitted_contact_speed
+from hrc_env.safety.contact import (
+    CAPSULE_REGIONS,
+    make_contact_limits,
+    permitted_contact_speed,
+)
 from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, find_support
 from hrc_env.safety.reachability import (
     STANDSTILL_M_S,
@@ -68,6 +71,8 @@ NO_APPROACH_WEIGHT, RETREAT_WEIGHT = 1e4, 30.0
 relative to changes of joint velocities [rad/s]."""
 TOLERANCE_M_S = 1e-6
 """Violation below which a constraint counts as satisfied [m/s]."""
+LIMITS = make_contact_limits(CAPSULES)
+"""Contact limits of the capsules of an estimated body (S,)."""
 
 
 class ShieldOutput(NamedTuple):
@@ -147,11 +152,12 @@ def execute_verified(
     limit = partial(limit_speed, pose.frames, model.chain.slides, pose.links,
                     belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
     hold_s, change = max(config.reaction_s, dt_s), model.slew_rad_s2 * dt_s
+    tolerated_m_s = find_tolerated_speeds(model.mass_kg + weigh_loads(belief, model))
 
     def verify(intended: JointVelocities) -> Verification:
         reached = np.clip(intended, command - change, command + change)
         sweep = sweep_path(belief.robot, model, pose.links, reached, hold_s)
-        found = verify_sweep(sweep, bodies, params, config.latency_s)
+        found = verify_sweep(sweep, bodies, tolerated_m_s, params, config.latency_s)
         near = _is_near_unseen_floor(belief, sweep, config)
         fastest = np.where(near, sweep.speed_m_s.max((1, 2)) - STANDSTILL_M_S, 0.0)
         return replace(found, excess_m_s=np.maximum(found.excess_m_s, fastest))
@@ -185,10 +191,16 @@ def _is_near_unseen_floor(belief: Belief, sweep: Sweep, config: ShieldConfig) ->
 def describe_pose(belief: Belief) -> ArmPose:
     """Return the poses of links and capsules. Loads are attached to the last link."""
     model = require(belief.model, "The robot's model (RobotModel) for a built-in shield")
-    n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
-    carried = np.full(n_loads, model.chain.n_joints - 1)
-    links = np.append(model.chain.capsule_link, carried)
+    links = model.list_capsule_links(len(belief.robot.capsule_radius_m))
     return ArmPose(model, chains.link_frames(model.chain, belief.robot.q), links)
+
+
+def weigh_loads(belief: Belief, model: RobotModel) -> Floats:
+    """Return the mass of the objects that each robot holds (B,) [kg]."""
+    if belief.objects is None:
+        return np.zeros(len(belief.action))
+    held_kg: Floats = belief.objects.held @ model.load_kg
+    return held_kg
 
 
 def build_constraints(
@@ -238,6 +250,8 @@ def build_constraints(
         low=low,
         high=high,
         slew=model.slew_rad_s2,
+        inverse_mass=model.invert_mass_matrices(pose.frames, weigh_loads(belief, model)),
+        obstacles=model.obstacles,
     )
     params, floor = config.make_params(), belief.unseen
     bodies = describe_bodies(belief, pose, is_lost, config, params.bounds)
@@ -266,12 +280,12 @@ def describe_bodies(
     estimate = belief.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
     touches = _find_allowed_touches(belief, pose, config)
-    contact_m_s = touches.segment_m_s
+    may_touch = touches.may_touch
     if is_lost.any():
         lost = is_lost[..., None, None]
         mean, velocity = np.where(lost, estimate.seen_world, mean), np.where(lost, 0.0, velocity)
         cov = np.where(lost[..., None], 0.0, cov)
-        contact_m_s = np.where(lost[..., 0], 0.0, contact_m_s)
+        may_touch = may_touch & ~lost[..., 0]
     walking_m_s = WALKING_M_S if config.worker_speed_m_s is None else config.worker_speed_m_s
     capsules, enclosure, support = enclose(mean), load_enclosure(), find_support(estimate, bounds)
     support.age_class[is_lost] = NOT_CALIBRATED
@@ -283,7 +297,8 @@ def describe_bodies(
         age_s=estimate.age_s,
         is_located=estimate.tracked | is_lost,
         moved_m=np.where(is_lost, walking_m_s * estimate.unobserved_s, 0.0),
-        contact_m_s=contact_m_s,
+        may_touch=may_touch,
+        limits=LIMITS,
         robot_share_m_s=touches.capsule_m_s,
         joints=enclosure.joints,
         shares=find_shares(),
@@ -293,35 +308,36 @@ def describe_bodies(
 
 @dataclass(frozen=True, slots=True)
 class AllowedTouches:
-    """Speed limits of the touches of estimated bodies that are allowed."""
+    """Touches of estimated bodies that are allowed, if their regions tolerate them."""
 
-    segment_m_s: Floats
-    """Maximum relative speed of a touch of each segment (B, W, S) [m/s]; 0 if no touch is
-    allowed."""
+    may_touch: Bools
+    """Mask (B, W, S) of the segments that may be touched."""
     capsule_m_s: Floats
     """Maximum speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
 
 
-def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the allowed touches: all for "pfl" and "sara", otherwise those of the task."""
-    model, links = pose.model, pose.links
-    shape = (*belief.estimate.tracked.shape, len(CAPSULES))
-    if config.kind in ("pfl", "sara"):
-        allowed = np.ones(shape, bool)
-        most_m_s = np.inf if config.kind == "pfl" else config.contact_speed_m_s
-        capsule_m_s = np.full(len(links), most_m_s)
-    elif belief.allowed_contact is None:
-        return AllowedTouches(np.zeros(shape), np.zeros(len(links)))
-    else:
-        is_last = links == model.chain.n_joints - 1
-        allowed = belief.allowed_contact
-        capsule_m_s = np.where(is_last, config.contact_speed_m_s, 0.0)
-    carried = 0.0 if belief.objects is None else belief.objects.held @ model.load_kg
-    mass_kg = np.broadcast_to(model.mass_kg + carried, len(belief.action))
+def find_tolerated_speeds(mass_kg: Floats) -> Floats:
+    """Return the speed of a robot that each segment tolerates in a contact (B, S) [m/s].
+
+    Args:
+        mass_kg: (B,) effective mass of the robot by the standard's rule [kg].
+    """
     regions = [CAPSULE_REGIONS[name] for name in CAPSULES]
     speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(regions)}
-    bears_m_s = np.stack([speeds[name] for name in regions], axis=1)[:, None]
-    return AllowedTouches(np.where(allowed, bears_m_s, 0.0), capsule_m_s)
+    return np.stack([speeds[name] for name in regions], axis=1)
+
+
+def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
+    """Return the allowed touches: all for "pfl" and "sara", otherwise those of the task."""
+    links = pose.links
+    shape = (*belief.estimate.tracked.shape, len(CAPSULES))
+    if config.kind in ("pfl", "sara"):
+        most_m_s = np.inf if config.kind == "pfl" else config.contact_speed_m_s
+        return AllowedTouches(np.ones(shape, bool), np.full(len(links), most_m_s))
+    if belief.allowed_contact is None:
+        return AllowedTouches(np.zeros(shape, bool), np.zeros(len(links)))
+    is_last = links == pose.model.chain.n_joints - 1
+    return AllowedTouches(belief.allowed_contact, np.where(is_last, config.contact_speed_m_s, 0.0))
 
 
 @kernel

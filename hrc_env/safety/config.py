@@ -89,9 +89,9 @@ class ShieldConfig:
     kind: str = "qp"
     """Method of the shield. "qp" selects the nearest joint velocities that satisfy all constraints.
     "ssm" scales all joint velocities by one factor. "pfl" is like "qp", but allows touches up to
-    the speed that the touched region of the body tolerates. "sara" executes a command only if the
-    robot can stop before its reachable set meets that of a person (`safety.reachability`), and
-    brakes otherwise."""
+    the speed that the touched region of the body tolerates, also where it would be clamped. "sara"
+    executes a command only if the robot can stop before its reachable set meets that of a person
+    (`safety.reachability`), and brakes otherwise."""
     margin: str = "conformal"
     """Margin for the error of the estimate. "conformal" is a calibrated quantile of the error
     (`safety.error_bounds`), or the constant margin for parts of the body to which the calibration

@@ -22,8 +22,10 @@ which it can stop within D (the robot's part of `separation.protective_distance`
 retreat. Constraints that no reachable command violates are omitted.
 
 A segment that may be touched causes no retreat while its speed of approach does not exceed the
-contact speed that its region of the body tolerates. Capsules that may touch it brake within gap -
-margin - error until the sum of their speed and that of the segment is below that limit. Points of
+contact speed that its region of the body tolerates from the effective mass of the robot at its
+nearest point along n (`safety.contact`). Capsules that may touch it brake within gap - margin -
+error until the sum of their speed and that of the segment is below that limit. If the segment would
+be clamped (`safety.clamping`), their own speed must also be below the limit for clamping. Points of
 other capsules may approach at `creep_m_s` if D permits less.
 
 A worker without a recent detection may be anywhere within walking distance of the last detected
@@ -47,12 +49,17 @@ from hrc_env.core.typing import (
     JointVelocities,
     Points3,
     Transforms,
+    Vector3,
     Velocities3,
 )
 from hrc_env.core.vacancy import POSSIBLE, STATURE_M
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.distances import closest_parameters
+from hrc_env.geometry.inertia import find_mobility
+from hrc_env.geometry.shapes import WIDTH, set_capsules
+from hrc_env.safety.clamping import Installation, is_clamped
 from hrc_env.safety.config import ShieldParams
+from hrc_env.safety.contact import ContactLimits, find_permitted_speeds
 from hrc_env.safety.error_bounds import Support, find_error_bound
 
 MAX_CONSTRAINTS = 32
@@ -83,6 +90,10 @@ class Robots(NamedTuple):
     """Maximum reachable joint velocities (B, N) [rad/s]."""
     slew: Floats
     """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
+    inverse_mass: Floats
+    """Inverse of the mass matrix (B, N, N), including loads [1 / (kg m^2); 1/kg for slides]."""
+    obstacles: Floats
+    """Fixed shapes around the robot (G, `shapes.WIDTH`)."""
 
 
 class Bodies(NamedTuple):
@@ -103,9 +114,10 @@ class Bodies(NamedTuple):
     moved_m: Floats
     """Distance that a lost worker may have walked since the last detection (B, W) [m]; 0 for
     others."""
-    contact_m_s: Floats
-    """Maximum relative speed of a touch of each segment (B, W, S) [m/s]; 0 if no touch is
-    allowed."""
+    may_touch: Bools
+    """Mask (B, W, S) of the segments that may be touched."""
+    limits: ContactLimits
+    """Contact limits of the segments (S,)."""
     robot_share_m_s: Floats
     """Maximum speed of each of the robot's capsules in an allowed touch (K,) [m/s]."""
     joints: Ints
@@ -195,6 +207,23 @@ class Nearest(NamedTuple):
     """Position of the point along the segment, from 0 at its first end to 1 at its second."""
 
 
+class Pair(NamedTuple):
+    """A robot's capsule and a body's segment that may touch."""
+
+    e: int
+    """Index of the environment."""
+    c: int
+    """Index of the robot's capsule."""
+    w: int
+    """Index of the worker."""
+    s: int
+    """Index of the segment."""
+    along: float
+    """Position of the segment's nearest point, from 0 at its first end to 1 at its second."""
+    comes_m_s: float
+    """Speed of that point towards the robot [m/s]; 0 if it moves away."""
+
+
 class Approach(NamedTuple):
     """Motion of a point of a body towards a robot, and its uncertainty."""
 
@@ -226,7 +255,11 @@ def add_worker_constraints(
         out: receives `J`, `b`, `n_rows` and `clearance_m`; `low` and `high` are left unchanged.
     """
     n_caps, n_segments = robots.capsules.shape[1], bodies.segments.shape[2]
-    rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
+    rods, limbs, shapes = (
+        np.empty((n_caps, 5)),
+        np.empty((n_segments, 5)),
+        np.empty((n_caps, WIDTH)),
+    )
     normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
     for e in range(len(robots.capsules)):
         out.n_rows[e], out.clearance_m[e] = 0, np.inf
@@ -234,6 +267,7 @@ def add_worker_constraints(
         for c in range(n_caps):
             bound_capsule(robots.capsules[e, c], robots.radii_m[c], rods[c])
             rods[c, 4] = find_stopping_distance(arm, robots.links[c], robots.capsules[e, c], params)
+        set_capsules(shapes, 0, robots.capsules[e], robots.radii_m)
         for w in range(bodies.segments.shape[1]):
             if not bodies.is_located[e, w]:
                 continue
@@ -256,10 +290,11 @@ def add_worker_constraints(
                 reach = write_row(arm, link, point, normal, row)
                 braking = min(reach.deceleration_m_s2, params.deceleration_m_s2)
                 bound = bound_approach(clear, braking, moved > 0.0, params)
-                left_m_s = bodies.contact_m_s[e, w, s] - max(towards.speed_m_s, 0.0)
-                if left_m_s > 0.0:
-                    touch_m_s = min(left_m_s, bodies.robot_share_m_s[c])
-                    bound = max(bound, bound_touch(near, touch_m_s, braking, params))
+                if bound < reach.max_speed_m_s and bodies.may_touch[e, w, s]:
+                    pair = Pair(e, c, w, s, nearest.along, max(towards.speed_m_s, 0.0))
+                    touch_m_s = limit_touch(robots, bodies, pair, shapes, normal, row)
+                    if touch_m_s >= 0.0:
+                        bound = max(bound, bound_touch(near, touch_m_s, braking, params))
                 if bound < reach.max_speed_m_s:
                     keep_tightest(row, bound, e, out)
 
@@ -538,6 +573,41 @@ def bound_approach(
     reaction_s = params.reaction_s
     root = math.sqrt(reaction_s**2 + 2.0 * clearance_m / max(braking_m_s2, 1e-9))
     return braking_m_s2 * (root - reaction_s)
+
+
+@kernel
+def limit_touch(
+    robots: Robots, bodies: Bodies, pair: Pair, shapes: Floats, normal: Floats, row: Floats
+) -> float:
+    """Return the maximum speed of a robot in a touch of a segment [m/s]; -1 if none is tolerated.
+
+    Args:
+        robots: the robots, with their mass matrices and surroundings.
+        bodies: the estimated bodies, with the limits of their segments.
+        pair: the capsule and the segment.
+        shapes: (K, `shapes.WIDTH`) the capsules of the robot.
+        normal: (3,) unit vector n.
+        row: (N,) row n.J.
+    """
+    e, w, s, along = pair.e, pair.w, pair.s, pair.along
+    mobility = find_mobility(robots.inverse_mass[e], row)
+    permitted = find_permitted_speeds(bodies.limits, s, mobility)
+    left_m_s = permitted.free_m_s - pair.comes_m_s
+    if left_m_s <= 0.0:
+        return -1.0
+    touch_m_s = min(left_m_s, bodies.robot_share_m_s[pair.c])
+    if permitted.clamping_m_s < touch_m_s:
+        ends = bodies.segments[e, w, s]
+        centre = Vector3(
+            ends[0, 0] + along * (ends[1, 0] - ends[0, 0]),
+            ends[0, 1] + along * (ends[1, 1] - ends[0, 1]),
+            ends[0, 2] + along * (ends[1, 2] - ends[0, 2]),
+        )
+        reach_m = bodies.radii_m[e, w, s] + bodies.limits.min_gap_m[s]
+        installation = Installation(robots.obstacles, shapes, robots.links)
+        if is_clamped(installation, robots.links[pair.c], centre, normal, reach_m):
+            return permitted.clamping_m_s
+    return touch_m_s
 
 
 @kernel

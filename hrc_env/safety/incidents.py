@@ -9,13 +9,16 @@ previous control step, because the impact changes the motion in the step itself:
 *towards* the worker, was *fleeing*, or was *standing*. The closing speed is the sum of the robot's
 speed in the previous step and the worker's, which no impact changes. The greatest speeds of the
 last `N_RECENT` steps are reported beside them, because a robot may brake before it touches. The
-force of a contact is computed by the model of ISO/TS 15066, A.3, and divided by the permitted force
-of the touched region (`safety.contact`).
+force of a contact is computed by the model of ISO/TS 15066, A.3, with the effective mass of the
+robot at the touching point along that line, and divided by the permitted force of the touched
+region (`safety.contact`). A robot that moves towards a part that cannot yield (`safety.clamping`)
+clamps it: then the ratio is the greater of that of the transient contact at the closing speed and
+that of the quasi-static contact at the robot's own speed.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -23,10 +26,28 @@ from hrc_env.core.batching import Stateful
 from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Capsules, Floats, Ints, Points3, Velocities3
+from hrc_env.core.typing import (
+    Capsules,
+    Floats,
+    Ints,
+    JointAngles,
+    Points3,
+    Vector3,
+    Velocities3,
+)
+from hrc_env.geometry.chains import lever, link_frames
 from hrc_env.geometry.distances import closest_parameters, least_separation
+from hrc_env.geometry.inertia import find_mobility
 from hrc_env.geometry.robot_model import RobotModel
-from hrc_env.safety.contact import CAPSULE_REGIONS, REGIONS, BodyRegion, contact_force
+from hrc_env.geometry.shapes import WIDTH, set_capsules
+from hrc_env.safety.clamping import Installation, is_clamped
+from hrc_env.safety.contact import (
+    CAPSULE_REGIONS,
+    REGIONS,
+    BodyRegion,
+    clamping_force,
+    contact_force,
+)
 from hrc_env.safety.separation import protective_distance
 from hrc_env.world import World
 
@@ -93,6 +114,8 @@ class Incident:
     none begins."""
     force_ratio: float
     """Force of the contact that begins, divided by the permitted force; NaN if none begins."""
+    is_clamped: bool
+    """Whether the robot clamps the touched part in the contact that begins."""
     severity: int
     """Severity `WITHIN`, `BEYOND` or `NEVER` of the contact that begins; 0 if none begins."""
     is_separation_violated: bool
@@ -122,6 +145,8 @@ class Summary:
     """Maximum force of a contact that begins, divided by the permitted force."""
     contact_severity: float
     """Maximum severity of a contact that begins; 0 if none begins."""
+    contact_is_clamped: float
+    """1 if the robot clamps a part of a body in a contact that begins, else 0."""
     contacts_towards: float
     """Number of contacts in the episode so far in which the robot moved towards the worker."""
     contacts_fleeing: float
@@ -206,6 +231,20 @@ class Touch:
     """Position of the touching point along the worker's capsule, from 0 to 1."""
     normal_world: Points3
     """Unit vector (3,) from the robot's point to the worker's; zero if the axes intersect."""
+    step: int
+    """Physics step of the touch."""
+
+
+@dataclass(frozen=True, slots=True)
+class TouchingRobots:
+    """Robots in contacts: their masses, poses and surroundings."""
+
+    model: RobotModel
+    """Constant properties of the robots."""
+    q: JointAngles
+    """Joint positions (B, N) at the end of the step [rad], or [m] for slides."""
+    load_kg: Floats
+    """Mass of the load of each robot (B,) [kg]."""
 
 
 def measure_paths(
@@ -258,7 +297,7 @@ def detect_incidents(
     recent: RecentMotion,
     paths: Paths,
     regions: Ints,
-    robot_kg: Floats,
+    robots: TouchingRobots,
     stop_s: Floats,
     dt_s: float,
 ) -> Records2[Incident]:
@@ -269,7 +308,7 @@ def detect_incidents(
         recent: motion before this step, which is added to it.
         paths: capsules of the bodies at the physics steps.
         regions: (L,) region of each capsule of a body, as an index into `REGION_NAMES`.
-        robot_kg: (B,) effective mass of the robot in a contact [kg].
+        robots: the robots, for the force of contacts.
         stop_s: (B,) time that the robot needs to stop [s].
         dt_s: duration of the step [s].
     """
@@ -285,7 +324,11 @@ def detect_incidents(
         incidents["region"][b, w] = region
         _measure_contact(incidents, recent, paths, touch, (b, w), took_s)
         history["contacts"][b, w, incidents["kind"][b, w]] += 1
-        _rate_contact(incidents, b, w, REGIONS[REGION_NAMES[region]], float(robot_kg[b]))
+        touched = REGIONS[REGION_NAMES[region]]
+        is_pushed = incidents["kind"][b, w] == TOWARDS
+        is_stuck = _cannot_yield(robots, paths, touch, (b, w), touched.min_gap_m)
+        incidents["is_clamped"][b, w] = is_pushed and is_stuck
+        _rate_contact(incidents[b, w], touched, _measure_effective_mass(robots, paths, touch, b))
     recent.record(paths, took_s)
     b, w = np.nonzero(incidents["robot_m_s"] > MOVING_M_S)
     if len(b):
@@ -329,7 +372,7 @@ def _find_touch(paths: Paths, b: int, w: int, t: int) -> Touch:
     closest = closest_parameters(robot[c, 0], robot[c, 1], worker[k, 0], worker[k, 1])
     apart = _locate(worker[k], closest.t) - _locate(robot[c], closest.s)
     normal = apart / max(float(np.linalg.norm(apart)), 1e-9)
-    return Touch(c, k, closest.s, closest.t, normal)
+    return Touch(c, k, closest.s, closest.t, normal, t)
 
 
 def _locate(ends: Floats, along: float) -> Floats:
@@ -374,18 +417,67 @@ def _measure_contact(
     )
 
 
-def _rate_contact(
-    incidents: Records2[Incident], b: int, w: int, region: BodyRegion, robot_kg: float
-) -> None:
+def _measure_effective_mass(robots: TouchingRobots, paths: Paths, touch: Touch, b: int) -> float:
+    """Return the effective mass of robot `b` at a touching point along the normal [kg].
+
+    It is infinite if no joint moves the point along the normal.
+    """
+    model, one = robots.model, slice(b, b + 1)
+    frames = link_frames(model.chain, robots.q[one])
+    inverse = model.invert_mass_matrices(frames, robots.load_kg[one])[0]
+    at = _locate(paths.robot_world[b, touch.step, touch.robot_capsule], touch.robot_along)
+    link = model.list_capsule_links(paths.robot_world.shape[2])[touch.robot_capsule]
+    row = np.zeros(model.chain.n_joints)
+    for i in range(link + 1):
+        column = lever(frames[0, i], model.chain.slides[i], at)
+        row[i] = np.dot(column, touch.normal_world)
+    mobility = find_mobility(inverse, row)
+    return 1.0 / mobility if mobility > 0.0 else np.inf
+
+
+def _cannot_yield(
+    robots: TouchingRobots, paths: Paths, touch: Touch, at: tuple[int, int], min_gap_m: float
+) -> bool:
+    """Return whether the robot would clamp the touched part against something.
+
+    Args:
+        robots: the robots, with their surroundings.
+        paths: capsules of the bodies at the physics steps.
+        touch: the capsules that touch.
+        at: indices of environment and worker.
+        min_gap_m: gap behind the part below which it is clamped [m].
+    """
+    b, w = at
+    own = paths.robot_world[b, touch.step]
+    links, shapes = robots.model.list_capsule_links(len(own)), np.empty((len(own), WIDTH))
+    set_capsules(shapes, 0, own, paths.robot_radius_m)
+    part = paths.workers_world[b, touch.step, w, touch.worker_capsule]
+    centre = Vector3(*_locate(part, touch.worker_along).tolist())
+    reach_m = float(paths.worker_radius_m[b, w, touch.worker_capsule]) + min_gap_m
+    installation = Installation(robots.model.obstacles, shapes, links)
+    link = int(links[touch.robot_capsule])
+    return bool(is_clamped(installation, link, centre, touch.normal_world, reach_m))
+
+
+def _rate_contact(incident: Any, region: BodyRegion, robot_kg: float) -> None:
     """Compute the force ratio and the severity of a contact.
 
-    For the head, the limit of a quasi-static contact applies.
+    For the head, the limit of a quasi-static contact always applies.
+
+    Args:
+        incident: the contact (a row of `INCIDENT`), with its speeds and `is_clamped`; changed in
+            place.
+        region: region of the body that is touched.
+        robot_kg: effective mass of the robot [kg].
     """
-    bears_n = region.transient_n or region.quasi_static_n
-    force_n = contact_force(region.name, incidents["closing_speed_m_s"][b, w], robot_kg)
-    incidents["force_ratio"][b, w] = force_n / bears_n
-    within = WITHIN if incidents["force_ratio"][b, w] <= 1.0 else BEYOND
-    incidents["severity"][b, w] = within if region.is_touched else NEVER
+    force_n = contact_force(region.name, incident["closing_speed_m_s"], robot_kg)
+    ratio = float(force_n) / (region.transient_n or region.quasi_static_n)
+    if incident["is_clamped"]:
+        pressing_n = clamping_force(region.name, incident["robot_speed_m_s"], robot_kg)
+        ratio = max(ratio, float(pressing_n) / region.quasi_static_n)
+    incident["force_ratio"] = ratio
+    within = WITHIN if ratio <= 1.0 else BEYOND
+    incident["severity"] = within if region.is_touched else NEVER
 
 
 @kernel
@@ -419,7 +511,7 @@ def _advance_history(
             now.robot_m_s = (gaps_m[1, b, w] - gap) / took_s
             now.worker_m_s = (gaps_m[2, b, w] - gap) / took_s
             is_touching = first_touch[b, w] >= 0
-            now.kind, now.force_ratio = -1, np.nan
+            now.kind, now.force_ratio, now.is_clamped = -1, np.nan, False
             now.robot_speed_m_s = now.closing_speed_m_s = np.nan
             now.recent_robot_speed_m_s = now.recent_closing_speed_m_s = np.nan
             if is_touching and past.since_s >= CONTACT_GAP_S:
@@ -452,7 +544,8 @@ def _write_summaries(
         total.contact_robot_speed_m_s = total.contact_closing_speed_m_s = np.nan
         total.contact_recent_robot_speed_m_s = total.contact_recent_closing_speed_m_s = np.nan
         total.contact_force_ratio = np.nan
-        total.contact_severity = total.separation_violated = total.near_misses = 0.0
+        total.contact_severity = total.contact_is_clamped = 0.0
+        total.separation_violated = total.near_misses = 0.0
         total.contacts_towards = total.contacts_fleeing = total.contacts_standing = 0.0
         for w in range(incidents.shape[1]):
             one, past = incidents[b, w], history[b, w]
@@ -477,6 +570,7 @@ def _write_summaries(
             )
             total.contact_force_ratio = _find_greater(total.contact_force_ratio, one.force_ratio)
             total.contact_severity = max(total.contact_severity, one.severity)
+            total.contact_is_clamped = 1.0 if one.is_clamped else total.contact_is_clamped
             total.contacts_towards += past.contacts[TOWARDS]
             total.contacts_fleeing += past.contacts[FLEEING]
             total.contacts_standing += past.contacts[STANDING]
@@ -526,12 +620,12 @@ class IncidentMonitor(Stateful):
 
     def step(self, world: World, paths: Paths) -> Records2[Incident]:
         """Detect and return the incidents (B, W) of a control step."""
-        hits_kg = np.full(len(self.history), self.model.mass_kg)
-        if world.objects is not None:
-            hits_kg += world.objects.held @ self.model.load_kg
+        model, objects = self.model, world.objects
+        load_kg = np.zeros(len(self.history)) if objects is None else objects.held @ model.load_kg
+        robots = TouchingRobots(model, world.robot.q, load_kg)
         stop_s = self.find_stop_time(world.robot)
         return detect_incidents(
-            self.history, self.recent, paths, self.regions, hits_kg, stop_s, self.dt_s
+            self.history, self.recent, paths, self.regions, robots, stop_s, self.dt_s
         )
 
     def find_stop_time(self, robot: RobotState) -> Floats:

@@ -122,18 +122,19 @@ def sweep_path(
 
 
 def verify_sweep(
-    sweep: Sweep, bodies: Bodies, params: ShieldParams, latency_s: float
+    sweep: Sweep, bodies: Bodies, tolerated_m_s: Floats, params: ShieldParams, latency_s: float
 ) -> Verification:
     """Verify that robots are slow enough wherever people can be until the robots stand still.
 
     Args:
         sweep: space that the robots sweep.
-        bodies: estimated bodies, with the speeds that they tolerate in a contact.
+        bodies: estimated bodies.
+        tolerated_m_s: (B, S) speed that each segment tolerates in a contact [m/s].
         params: margins of the shield and the speed of people.
         latency_s: additional age of the estimate [s].
     """
     result = Verification(np.empty(len(sweep.until_s)), np.empty(len(sweep.until_s)))
-    _find_excess(sweep, bodies, params, latency_s, result.gap_m, result.excess_m_s)
+    _find_excess(sweep, bodies, tolerated_m_s, params, latency_s, result.gap_m, result.excess_m_s)
     return result
 
 
@@ -141,6 +142,7 @@ def verify_sweep(
 def _find_excess(
     sweep: Sweep,
     bodies: Bodies,
+    tolerated_m_s: Floats,
     params: ShieldParams,
     latency_s: float,
     gaps_m: Floats,
@@ -151,6 +153,7 @@ def _find_excess(
     Args:
         sweep: space that the robots sweep.
         bodies: estimated bodies.
+        tolerated_m_s: (B, S) speed that each segment tolerates in a contact [m/s].
         params: margins of the shield and the speed of people.
         latency_s: additional age of the estimate [s].
         gaps_m: (B,) receives the smallest gaps [m].
@@ -182,8 +185,9 @@ def _find_excess(
                     gap = nearest.distance_m - radius_m - segment.radius_m - bodies.moved_m[e, w]
                     gap -= find_margin(segment, std_m, params) + reach_m
                     gaps_m[e] = min(gaps_m[e], gap)
-                    limit = min(bodies.contact_m_s[e, w, s], bodies.robot_share_m_s[c])
                     if gap < 0.0:
+                        tolerated = tolerated_m_s[e, s] if bodies.may_touch[e, w, s] else 0.0
+                        limit = min(tolerated, bodies.robot_share_m_s[c])
                         excess = sweep.speed_m_s[e, k, c] - max(limit, STANDSTILL_M_S)
                         excess_m_s[e] = max(excess_m_s[e], excess)
 

@@ -60,6 +60,7 @@ from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.camera_config import MAKES, CameraConfig
+from hrc_env.geometry.inertia import LinkInertias
 from hrc_env.geometry.lens import Lens, lens_row
 from hrc_env.geometry.reach import ReachTarget, check_reach
 from hrc_env.geometry.robot_model import RobotModel
@@ -2437,6 +2438,19 @@ CAPSULE_NAMES = tuple(contact.CAPSULE_REGIONS)
 CONTACT_KINDS = incidents.KINDS
 
 
+def _describe_robot(chain: chains.SerialChain, numbers: Mapping[str, Any]) -> RobotModel:
+    """Return a robot whose links share twice its effective mass, and in which a floor is fixed."""
+    n, middles = chain.n_joints, np.zeros((chain.n_joints, 3))
+    for link, ends in zip(chain.capsule_link, chain.capsule_ends, strict=True):
+        middles[link] = ends.mean(0)
+    mass_kg = np.full(n, 2.0 * numbers["mass_kg"] / n)
+    spread = 0.01 * mass_kg[:, None, None] * np.eye(3)
+    inertias = LinkInertias(mass_kg, middles, spread, np.full(n, 0.1))
+    floor = shapes.shape(shapes.PLANE, np.zeros(3), np.eye(3), np.array([np.inf, np.inf, 0.0]))
+    return RobotModel(chain, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
+                      numbers["load_kg"], inertias, floor[None])  # fmt: skip
+
+
 class Guarded:
     """Robots before people, and what a shield makes of their commands."""
 
@@ -2454,8 +2468,7 @@ class Guarded:
         ends = np.concatenate([robot.capsules_world, now["load_capsules"]], 1)
         radius_m = np.concatenate([robot.capsule_radius_m, now["load_radius_m"]])
         robot = dataclasses.replace(robot, capsules_world=ends, capsule_radius_m=radius_m)
-        model = RobotModel(made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
-                           numbers["load_kg"])  # fmt: skip
+        model = _describe_robot(made, numbers)
         n, estimate = len(ends), _as_estimate(now)
         nowhere = np.zeros((*now["held"].shape, 3))
         turn = np.zeros((*now["held"].shape, 4))
@@ -2579,8 +2592,7 @@ class Watched:
         numbers: Mapping[str, Any], step_s: float,
     ) -> None:  # fmt: skip
         """Begin episodes of a batch."""
-        model = RobotModel(chain._made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
-                           numbers["load_kg"])  # fmt: skip
+        model = _describe_robot(chain._made, numbers)
         self._make = partial(incidents.IncidentMonitor, batch, n_workers, capsule_names,
                              model=model, dt_s=step_s)  # fmt: skip
         self._watch: incidents.IncidentMonitor | None = None

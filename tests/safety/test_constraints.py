@@ -1,13 +1,15 @@
 """Rows: what they are by their definition, which pairs may be left out, how they differentiate."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 
 from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import JOINT
 from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M
-from hrc_env.geometry import chains
+from hrc_env.geometry import chains, shapes
 from hrc_env.geometry.distances import closest_parameters
 from hrc_env.geometry.enclosure import (
     CAPSULES,
@@ -16,6 +18,7 @@ from hrc_env.geometry.enclosure import (
     find_velocities,
     load_enclosure,
 )
+from hrc_env.geometry.inertia import find_mass_matrices
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.constraints import (
     MAX_CONSTRAINTS,
@@ -27,6 +30,13 @@ from hrc_env.safety.constraints import (
     add_floor_constraints,
     add_worker_constraints,
 )
+from hrc_env.safety.contact import (
+    CAPSULE_REGIONS,
+    REGIONS,
+    clamping_force,
+    make_contact_limits,
+    permitted_contact_speed,
+)
 from hrc_env.safety.error_bounds import (
     MAX_MISFIT,
     MAX_VIEWS,
@@ -35,7 +45,7 @@ from hrc_env.safety.error_bounds import (
     find_support,
 )
 from hrc_env.scene.build import build
-from hrc_env.scene.limits import slew_rad_s2
+from hrc_env.scene.limits import robot_model, slew_rad_s2
 
 RNG = np.random.default_rng(5)
 CONFIG = ShieldConfig(margin="constant", latency_s=0.05)
@@ -63,12 +73,20 @@ def before(scene, away_m):
     return chains.tool_frame(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
-def robots_of(chain, q, box):
+@cache
+def model_of(scene):
+    """The constants of a scene's robot."""
+    return robot_model(scene, np.ones(scene.chain.n_joints))
+
+
+def robots_of(scene, q, box):
     """One robot as the constraints need it."""
-    low, high, slew = box
+    (low, high, slew), chain, model = box, scene.chain, model_of(scene)
+    frames = chains.link_frames(chain, q[None])
+    inverse = model.invert_mass_matrices(frames, np.zeros(1))
     return Robots(
-        chains.link_frames(chain, q[None]), chain.slides, chain.capsule_link,
-        chains.capsules(chain, q[None]), chain.capsule_radius_m, low[None], high[None], slew,
+        frames, chain.slides, chain.capsule_link, chains.capsules(chain, q[None]),
+        chain.capsule_radius_m, low[None], high[None], slew, inverse, model.obstacles,
     )  # fmt: skip
 
 
@@ -97,19 +115,20 @@ def some_bounds():
     )  # fmt: skip
 
 
-def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0, bounds=None):
-    touch_m_s, most_m_s = touches
+def rows_of(scene, q, estimate, box, config=CONFIG, touches=(False, 0.0), gone_m=0.0, bounds=None):
+    (may_touch, most_m_s), chain = touches, scene.chain
     capsules, params = enclose(estimate.mean_world), config.make_params()
     params = params._replace(bounds=bounds or params.bounds)
     bodies = Bodies(
         *capsules,
         find_velocities(capsules, estimate.mean_world, estimate.velocity_world),
         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
-        touch_m_s + np.zeros((1, 1, N_CAPSULES)), most_m_s + np.zeros(len(chain.capsule_link)),
-        load_enclosure().joints, shares(), find_support(estimate, params.bounds),
+        may_touch | np.zeros((1, 1, N_CAPSULES), bool), make_contact_limits(CAPSULES),
+        most_m_s + np.zeros(len(chain.capsule_link)), load_enclosure().joints, shares(),
+        find_support(estimate, params.bounds),
     )  # fmt: skip
     found = no_constraints(chain, box)
-    add_worker_constraints(robots_of(chain, q, box), bodies, params, found)
+    add_worker_constraints(robots_of(scene, q, box), bodies, params, found)
     n = int(found.n_rows[0])
     return found.J[0, :n], found.b[0, :n], found.clearance_m[0]
 
@@ -132,9 +151,41 @@ def bound_of(bounds, s, sigma, estimate):
     return None
 
 
-def defined(chain, q, estimate, box, p, touches, bounds=None):
+def borne(scene, q, row, s, centre, n, radius_m, link):
+    """Speeds [m/s] that a segment bears by the definition, free and as the robot touches it now."""
+    model = model_of(scene)
+    M = find_mass_matrices(
+        scene.chain, model.inertias, chains.link_frames(scene.chain, q[None]), np.zeros(1)
+    )[0]
+    mass_kg = 1.0 / (row @ np.linalg.solve(M, row) + 1e-12)
+    region = REGIONS[CAPSULE_REGIONS[CAPSULES[s]]]
+    free = permitted_contact_speed(region.name, mass_kg)
+    pressed = region.quasi_static_n * region.is_touched / clamping_force(region.name, 1.0, mass_kg)
+    caps = zip(chains.capsules(scene.chain, q), scene.chain.capsule_radius_m, strict=True)
+    links = scene.chain.capsule_link
+    behind = [*model.obstacles, *(
+        capsule_shape(*each) for each, of in zip(caps, links, strict=True) if of != link
+    )]  # fmt: skip
+    is_stuck = any(first_met_m(shape, centre, n) <= radius_m + region.min_gap_m for shape in behind)
+    return free, pressed if is_stuck else np.inf
+
+
+def capsule_shape(ends, radius_m):
+    """A capsule as a row of a table of shapes."""
+    table = np.empty((1, shapes.WIDTH))
+    shapes.set_capsules(table, 0, ends[None], np.array([radius_m]))
+    return table[0]
+
+
+def first_met_m(shape, centre, n):
+    """How far along n a shape begins; infinite if it is not met."""
+    found = shapes.passage(shape[None], 0, centre - shape[shapes.CENTRE : shapes.AXES], n)
+    return found.enter if found.leave >= max(found.enter, 0.0) else np.inf
+
+
+def defined(scene, q, estimate, box, p, touches, bounds=None):
     """The rows by their definition, pair by pair, and the least D of all pairs."""
-    (low, high, slew), (touch_m_s, most_m_s) = box, touches
+    (low, high, slew), (may_touch, most_m_s), chain = box, touches, scene.chain
     caps, enclosure = chains.capsules(chain, q), load_enclosure()
     body = enclose(estimate.mean_world)
     limbs, radii_m = body.ends_world[0, 0], body.radius_m[0, 0]
@@ -171,9 +222,15 @@ def defined(chain, q, estimate, box, p, touches, bounds=None):
             bound = max(-p.max_retreat_m_s, p.retreat_gain_hz * clear)
             if clear >= 0:
                 bound = a * (math.sqrt(p.reaction_s**2 + 2 * clear / a) - p.reaction_s)
-            left_m_s = touch_m_s[s] - max(v_h, 0)
+            link = chain.capsule_link[c]
+            is_near = bound < np.maximum(row * low, row * high).sum()
+            touch = is_near and may_touch[s]
+            free, pressed = (
+                borne(scene, q, row, s, to, n, radii_m[s], link) if touch else (0.0, 0.0)
+            )
+            left_m_s = free - max(v_h, 0)
             if left_m_s > 0:
-                share_m_s = min(left_m_s, most_m_s[c])
+                share_m_s = min(left_m_s, most_m_s[c], pressed)
                 brakes = math.sqrt(share_m_s**2 + 2 * a * max(gap - margin - error, 0))
                 allowed = max(share_m_s, brakes - a * p.reaction_s)
                 bound = max(bound, allowed if share_m_s else p.creep_m_s)
@@ -208,9 +265,9 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         estimate = somebody(middle_m + away)
         middle = RNG.uniform(-0.5, 0.5, chain.n_joints) * chain.velocity_limit_rad_s
         low, high = middle - 0.3, middle + 0.3
-        touch_m_s = RNG.uniform(0.3, 1.5, N_CAPSULES) * (RNG.random(N_CAPSULES) < touched)
+        may_touch = RNG.random(N_CAPSULES) < touched
         most_m_s = RNG.choice([0.0, 0.25, np.inf], len(chain.capsule_link))
-        given = chain, q, estimate, (low, high, slew), CONFIG, (touch_m_s, most_m_s)
+        given = scene, q, estimate, (low, high, slew), CONFIG, (may_touch, most_m_s)
         J, b, least_m = rows_of(*given, bounds=bounds)
         expected, all_m = defined(*given, bounds)
         np.testing.assert_allclose(np.sort(b), expected[:MAX_CONSTRAINTS, 0], atol=1e-6)
@@ -223,11 +280,11 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
     assert several > 5
 
 
-def floor_rows_of(chain, q, places, level, reach_m, box, config=CONFIG):
+def floor_rows_of(scene, q, places, level, reach_m, box, config=CONFIG):
     """The rows b, n.J of pieces of floor, the tightest first, and the least D."""
     floor = UnseenFloors(places, np.array([level]), np.array([reach_m]))
-    found = no_constraints(chain, box)
-    add_floor_constraints(robots_of(chain, q, box), floor, config.make_params(), found)
+    found = no_constraints(scene.chain, box)
+    add_floor_constraints(robots_of(scene, q, box), floor, config.make_params(), found)
     rows = np.column_stack([found.b[0], found.J[0]])[: found.n_rows[0]]
     return rows[rows[:, 0].argsort()], found.clearance_m[0]
 
@@ -259,7 +316,7 @@ def test_a_robot_can_brake_before_somebody_on_floor_that_no_camera_has_seen(robo
                 expected.append((bound, *row))
         places = np.stack([foot, caps[-1, 1] * (1.0, 1.0, 0.0)])
         levels = [POSSIBLE, EMPTY]
-        rows, _ = floor_rows_of(chain, q, places, levels, reach_m, (low, high, slew))
+        rows, _ = floor_rows_of(scene, q, places, levels, reach_m, (low, high, slew))
         np.testing.assert_allclose(
             rows, np.array(sorted(expected)).reshape(-1, 1 + len(q)), atol=2e-4
         )
@@ -271,17 +328,17 @@ def test_who_is_not_tracked_has_no_rows():
     scene = build()
     estimate = somebody(before(scene, 0.4))
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    assert len(rows_of(scene.chain, scene.home_q, estimate, box)[1])
+    assert len(rows_of(scene, scene.home_q, estimate, box)[1])
     estimate.tracked[:] = False
-    assert len(rows_of(scene.chain, scene.home_q, estimate, box)[1]) == 0
+    assert len(rows_of(scene, scene.home_q, estimate, box)[1]) == 0
 
 
 def test_who_may_have_gone_anywhere_is_come_no_nearer_to_and_the_nearest_pairs_are_kept():
     scene = build()
     estimate = somebody(before(scene, 0.9), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, box)
-    _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, box, gone_m=3.0)
+    _, seen, least_m = rows_of(scene, scene.home_q, estimate, box)
+    _, b, gone_least_m = rows_of(scene, scene.home_q, estimate, box, gone_m=3.0)
     assert gone_least_m == pytest.approx(least_m - 3.0)
     assert len(b) == MAX_CONSTRAINTS > len(seen)
     assert (b < 0.0).all()
@@ -293,13 +350,17 @@ def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed(
     scene = build()
     estimate = somebody(before(scene, 0.1), speed_m_s=0.0)
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
-    _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, box)
+    _, strict, _ = rows_of(scene, scene.home_q, estimate, box)
     assert strict.min() < 0.0
-    for most_m_s, bound in ((np.inf, 0.4), (0.25, 0.25), (0.0, CONFIG.creep_m_s)):
-        given = scene.chain, scene.home_q, estimate, box, CONFIG, (0.4, most_m_s)
-        _, b, _ = rows_of(*given)
-        assert b.min() == pytest.approx(bound)
-    estimate.velocity_world[..., 0] = -1.0
+    estimate.mean_world[..., JOINT["nose"], 2] += 3.0  # the head, which must never be touched
+    found = {}
+    for most_m_s in (np.inf, 0.25, 0.0):
+        given = scene, scene.home_q, estimate, box, CONFIG, (True, most_m_s)
+        found[most_m_s] = rows_of(*given)[1].min()
+    assert found[0.25] == pytest.approx(0.25)
+    assert found[0.0] == pytest.approx(CONFIG.creep_m_s)
+    assert found[np.inf] > 0.4
+    estimate.velocity_world[..., 0] = -2.0
     _, b, _ = rows_of(*given)
     assert b.min() < 0.0
 
@@ -314,5 +375,5 @@ def test_a_part_that_one_camera_carries_is_kept_away_from_more_than_a_late_one()
     least_m = []
     for age_s in (0.0, 0.25):
         estimate.age_s[:] = age_s
-        least_m.append(rows_of(scene.chain, scene.home_q, estimate, box)[2])
+        least_m.append(rows_of(scene, scene.home_q, estimate, box)[2])
     assert least_m[1] - least_m[0] == pytest.approx(2 * 0.15 + 5 * (0.15 - 0.08) - 0.15)

@@ -8,9 +8,12 @@ from hrc_env.geometry.enclosure import CAPSULES
 from hrc_env.safety.contact import (
     CAPSULE_REGIONS,
     REGIONS,
+    clamping_force,
     contact_force,
     effective_mass,
+    find_permitted_speeds,
     find_region,
+    make_contact_limits,
     permitted_contact_speed,
 )
 
@@ -57,6 +60,19 @@ def test_a_hit_at_the_permitted_speed_is_the_permitted_force():
     assert speed[1] < speed[0]
 
 
+@pytest.mark.parametrize("name", CAPSULES)
+def test_the_speeds_that_a_shield_permits_are_those_of_the_limits(name):
+    region, limits = REGIONS[CAPSULE_REGIONS[name]], make_contact_limits(CAPSULES)
+    speeds = find_permitted_speeds(limits, CAPSULES.index(name), 1.0 / 6.0)
+    assert speeds.free_m_s == pytest.approx(permitted_contact_speed(region.name, 6.0))
+    if not region.is_touched:
+        assert speeds == (0.0, 0.0)
+        return
+    force_n = clamping_force(region.name, speeds.clamping_m_s, 6.0)
+    assert force_n == pytest.approx(region.quasi_static_n)
+    assert 0.0 < speeds.clamping_m_s < 0.5 * speeds.free_m_s
+
+
 @pytest.mark.parametrize(
     ("ask", "said"),
     [
@@ -64,6 +80,7 @@ def test_a_hit_at_the_permitted_speed_is_the_permitted_force():
         (lambda: effective_mass(-1.0), "moving_kg must be positive"),
         (lambda: effective_mass(1.0, -1.0), "load_kg not be negative"),
         (lambda: contact_force("chest", 1.0, 0.0), "robot_kg must be a positive mass"),
+        (lambda: clamping_force("chest", 1.0, -1.0), "robot_kg must be a positive mass"),
     ],
 )
 def test_what_cannot_be_is_said(ask, said):

@@ -7,11 +7,21 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.geometry import shapes
+from hrc_env.geometry.chains import SerialChain
+from hrc_env.geometry.inertia import LinkInertias
+from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.motion.starts import measure_gap_m
 from hrc_env.safety import contact, incidents
-from hrc_env.safety.contact import contact_force
+from hrc_env.safety.contact import clamping_force, contact_force
 from hrc_env.safety.cost import COMPONENTS, CostConfig, find_unsafe, measure_cost
-from hrc_env.safety.incidents import KINDS, detect_incidents, make_history, make_recent_motion
+from hrc_env.safety.incidents import (
+    KINDS,
+    TouchingRobots,
+    detect_incidents,
+    make_history,
+    make_recent_motion,
+)
 from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
@@ -21,10 +31,28 @@ DT, T = 0.04, 5
 REGIONS = incidents.find_regions(["left_hand", "head"])
 
 
+def a_slide(mass_kg=15.0, wall_m=None):
+    """A robot of one link that slides along x, perhaps before a wall at a place on x [m]."""
+    along_x = np.eye(4)
+    along_x[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # z of the slide is the world's x
+    chain = SerialChain(
+        np.eye(4), along_x[None], np.eye(4), np.array([[-9.0, 9.0]]), np.ones(1),
+        np.ones(1, bool), np.zeros(1, int), np.zeros((1, 2, 3)), np.array([0.1]),
+    )  # fmt: skip
+    one = np.ones(1)
+    inertias = LinkInertias(mass_kg * one, np.zeros((1, 3)), np.zeros((1, 3, 3)), 0.0 * one)
+    walls = np.zeros((0, shapes.WIDTH))
+    if wall_m is not None:
+        centre, half = np.array([wall_m + 0.1, 0.0, 0.0]), np.array([0.1, 2.0, 2.0])
+        walls = shapes.shape(shapes.BOX, centre, np.eye(3), half)[None]
+    return RobotModel(chain, one, one, 0.5 * mass_kg, np.zeros(0), inertias, walls)
+
+
 class Line:
     """A robot of one ball and a worker of a hand, and a head 5 m behind it, that move along x."""
 
-    def __init__(self, gap_m=0.5, n_workers=1):
+    def __init__(self, gap_m=0.5, n_workers=1, wall_m=None):
+        self.robot = TouchingRobots(a_slide(wall_m=wall_m), np.zeros((1, 1)), np.zeros(1))
         self.state, self.robot_m = make_history(1, n_workers), 0.0
         self.recent = make_recent_motion(1, 1, n_workers, 2)
         self.hand_m = np.full(n_workers, gap_m + 0.2)
@@ -40,8 +68,8 @@ class Line:
         robots[..., 0] = robot[None, :, None, None]
         workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
         paths = incidents.measure_paths(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
-        kg, stop_s = np.array([15.0]), np.array([0.1])
-        found = detect_incidents(self.state, self.recent, paths, REGIONS, kg, stop_s, DT)
+        given = paths, REGIONS, self.robot, np.array([0.1]), DT
+        found = detect_incidents(self.state, self.recent, *given)
         self.is_unsafe = find_unsafe(measure_cost(paths.gaps_m, CostConfig()), found)[0]
         return found[0]
 
@@ -98,7 +126,7 @@ def test_a_contact_is_of_the_pair_that_touches_though_another_is_nearer_before()
         workers[0, :, 0, 0, :, 0], workers[0, :, 0, 1, :, 0] = 0.24, 9.21
         radius_m = np.full((1, 1, 2), 0.1)
         paths = incidents.measure_paths(robots, np.full(2, 0.1), workers, radius_m)
-        given = paths, REGIONS, np.array([15.0]), np.array([0.1]), DT
+        given = paths, REGIONS, Line().robot, np.array([0.1]), DT
         found = detect_incidents(history, recent, *given)[0, 0]
     assert KINDS[found["kind"]] == "towards"
     assert incidents.REGION_NAMES[found["region"]] == "hand and fingers"
@@ -122,12 +150,52 @@ def test_a_robot_that_has_just_stopped_is_named_by_its_last_step_and_its_recent_
 
 def test_the_head_is_never_to_be_hit():
     assert incidents.CAPSULE_REGIONS["head"] == "skull and forehead"
-    hits = np.zeros((1, 1), incidents.INCIDENT)
-    hits["closing_speed_m_s"] = 0.01
+    hit = np.zeros(1, incidents.INCIDENT)[0]
+    hit["closing_speed_m_s"] = 0.01
     head = contact.REGIONS[incidents.REGION_NAMES[incidents.find_regions(["head"])[0]]]
-    incidents._rate_contact(hits, 0, 0, head, 15.0)
-    assert hits["severity"] == incidents.NEVER
-    assert 0 < hits["force_ratio"] < 1
+    incidents._rate_contact(hit, head, 15.0)
+    assert hit["severity"] == incidents.NEVER
+    assert 0 < hit["force_ratio"] < 1
+
+
+@pytest.mark.parametrize(
+    ("wall_m", "robot_m_s", "hand_m_s", "clamped"),
+    [
+        (0.42, 0.4, 0.0, True),  # the wall is 9 cm behind the hand
+        (0.47, 0.4, 0.0, False),  # 14 cm
+        (None, 0.4, 0.0, False),
+        (0.36, 0.0, -1.0, False),  # the hand comes to a robot that stands
+        (0.40, 0.4, -3.0, True),  # the blow of a hand is harder than the wall
+    ],
+)
+def test_a_hand_before_a_wall_is_clamped_by_a_robot_that_moves_towards_it(
+    wall_m, robot_m_s, hand_m_s, clamped
+):
+    line = Line(0.03, wall_m=wall_m)
+    line.step(robot_m_s, 0.0)
+    found, at_m = [], line.hand_m.copy()
+    while not found:
+        hit = line.step(robot_m_s, hand_m_s)[0]
+        found += [hit] if hit["kind"] >= 0 else []
+    assert at_m == pytest.approx(0.23)
+    closing_m_s = robot_m_s - hand_m_s
+    free = contact_force("hand and fingers", closing_m_s, 15.0) / 280.0
+    pressed = clamping_force("hand and fingers", robot_m_s, 15.0) / 140.0
+    assert bool(hit["is_clamped"]) == clamped
+    assert hit["force_ratio"] == pytest.approx(max(free, pressed) if clamped else free)
+    told = incidents.summarize(np.array([[hit]]), line.state)[0]
+    assert told["contact_is_clamped"] == clamped
+
+
+def test_a_load_makes_a_contact_harder():
+    ratios = []
+    for load_kg in (0.0, 10.0):
+        line = Line(0.03)
+        line.robot.load_kg[:] = load_kg
+        line.step(0.4)
+        ratios.append(line.step(0.4)[0]["force_ratio"])
+    masses = contact_force("hand and fingers", 0.4, np.array([15.0, 25.0])) / 280.0
+    assert ratios == pytest.approx(masses.tolist())
 
 
 def test_a_near_miss_ends_without_a_touch():

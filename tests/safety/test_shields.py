@@ -13,11 +13,11 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.belief import drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import WorkerPath
+from hrc_env.core.records import ObjectState, WorkerPath
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.vacancy import EMPTY, POSSIBLE, PROBABLY_EMPTY, Coverage, Vacancy, no_others
 from hrc_env.env import HRCEnv
-from hrc_env.geometry import chains
+from hrc_env.geometry import chains, shapes
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.enclosure import CAPSULE, N_CAPSULES, enclose
 from hrc_env.motion import generator
@@ -414,8 +414,11 @@ HANDS = {"tool": (8, (1.0, 0.0, 0.0)), "forearm": (4, (0.0, -1.0, 0.0))}
 """Beside a capsule of the last link, and of another one, and on which side of it."""
 
 
-def comes_m_s(beside, welcome, shield):
-    """How fast a capsule comes to a hand that is 4 cm from it, if it wants to come fast."""
+def comes_m_s(beside, welcome, shield, wall_m=None, load_kg=0.0):
+    """How fast a capsule comes to a hand that is 4 cm from it, if it wants to come fast.
+
+    There may be a wall so far behind the hand, and a load in the hand.
+    """
     part, now = believed(n_workers=2)
     c, side = HANDS[beside]
     middle, aside = now.robot.capsules_world[0, c].mean(0), np.array(side)
@@ -427,7 +430,16 @@ def comes_m_s(beside, welcome, shield):
     tip_m = ((body.ends_world[0, hand] - middle) @ aside).min() - body.radius_m[0, hand]
     mean[0, 0] += (now.robot.capsule_radius_m[c] + 0.04 - tip_m) * aside
     still = {"mean_world": mean, "velocity_world": np.zeros_like(mean)}
-    now = replace(now, estimate=replace(now.estimate, **still), allowed_contact=welcome)
+    model, far_m = now.model, now.robot.capsule_radius_m[c] + 0.04 + 2.0 * body.radius_m[0, hand]
+    if wall_m is not None:
+        centre = middle + (far_m + wall_m + 1.0) * aside
+        box = shapes.shape(shapes.BOX, centre, np.eye(3), np.ones(3))
+        model = replace(model, obstacles=np.vstack([model.obstacles, box]))
+    model, nowhere = replace(model, load_kg=np.array([load_kg])), np.zeros((1, 1, 3))
+    load = ObjectState(nowhere, np.zeros((1, 1, 4)), nowhere, nowhere, np.ones((1, 1), bool))
+    now = replace(now, objects=load)
+    known = {"estimate": replace(now.estimate, **still), "allowed_contact": welcome}
+    now = replace(now, model=model, **known)
     turns = part.physics.q + 1e-6 * np.eye(6)
     moved = chains.capsules(part.chain, turns)[:, c].mean(1)
     towards = (moved - chains.capsules(part.chain, part.physics.q)[0, c].mean(0)) @ aside / 1e-6
@@ -448,6 +460,92 @@ def test_to_a_welcome_hand_the_last_link_may_come_and_others_stand_still(beside,
     assert comes_m_s(beside, arm_of(0), shield) == pytest.approx(most_m_s, abs=5e-3)
     assert comes_m_s(beside, arm_of(1), shield) < 5e-3
     assert comes_m_s(beside, np.zeros((1, 2, N_CAPSULES), bool), shield) < 5e-3
+
+
+CLOSE = ShieldConfig("pfl", margin="constant", max_retreat_m_s=0.0)
+
+
+@pytest.mark.parametrize("beside", HANDS)
+def test_to_a_hand_before_a_wall_it_comes_slower_than_to_one_in_free_air(beside):
+    free_m_s, behind_m_s, far_m_s = (
+        comes_m_s(beside, None, CLOSE, wall_m) for wall_m in (None, 0.08, 0.13)
+    )
+    assert behind_m_s < 0.4 * free_m_s
+    assert far_m_s == pytest.approx(free_m_s)
+    laden_m_s = comes_m_s(beside, None, CLOSE, 0.08, load_kg=20.0)
+    assert laden_m_s < (0.8 if beside == "tool" else 1.0) * behind_m_s
+
+
+def test_a_welcome_hand_before_a_wall_is_touched_no_faster_than_it_bears():
+    shield = ShieldConfig(contact_speed_m_s=0.25)
+    free_m_s, behind_m_s = (comes_m_s("tool", arm_of(0), shield, wall_m) for wall_m in (None, 0.05))
+    assert free_m_s == pytest.approx(0.25, abs=5e-3)
+    assert 0.05 < behind_m_s < 0.22
+
+
+def rate_contacts(shield, is_known=True, slab_m=1.0):
+    """Force ratios of contacts towards people with their arms, clamped ones and free ones.
+
+    A slab fills the room up to a height; the shield may not know of it.
+    """
+    envs = vector(32, shield)
+    part = envs.unwrapped.shards.first
+    box = shapes.shape(
+        shapes.BOX, np.array([0.0, 0.0, slab_m - 0.5]), np.eye(3), np.array([2.0, 2.0, 0.5])
+    )
+    model = replace(part.model, obstacles=np.vstack([part.model.obstacles, box]))
+    part.monitor.model = model
+    part.model = model if is_known else part.model
+    clamped, free = [], []
+    for infos, _ in steps(envs, 200, seed=18_003_000):
+        is_towards = infos["worker_0/contact_kind"] == 0
+        is_head = infos["safety/contact_severity"] == 3
+        for b in np.flatnonzero(is_towards & ~is_head):
+            kept = clamped if infos["safety/contact_is_clamped"][b] else free
+            kept.append(infos["safety/contact_force_ratio"][b])
+    return clamped, free
+
+
+def test_in_closed_loop_contacts_with_true_bodies_stay_within_their_limits():
+    """With true bodies estimated; only a shield that knows of what is behind them does so."""
+    (clamped, free), (unknown, _), (bare, _) = (
+        rate_contacts(*given) for given in (("pfl",), ("pfl", False), (None,))
+    )
+    assert len(clamped) >= 2
+    assert len(free) >= 5
+    assert max(clamped + free) < 1.1
+    assert max(unknown) > 1.3
+    assert max(bare) > 1.3
+
+
+def test_where_people_truly_are_changes_incidents_and_not_the_shield(monkeypatch):
+    commands, gaps_m, made = [], [], simulation.worker_capsules
+    for away_m in (0.0, 0.4):
+        envs = vector(6, "pfl", perception="keypoints")
+        part = envs.unwrapped.shards.first
+        for _ in steps(envs, 30, seed=18_004_100):
+            pass
+        monkeypatch.setattr(simulation, "worker_capsules", lambda *a, x=away_m: made(*a) + x)
+        infos = envs.step(np.ones((6, 6), np.float32))[4]
+        monkeypatch.setattr(simulation, "worker_capsules", made)
+        commands.append(part.physics.command)
+        gaps_m.append(infos["safety/min_separation_m"])
+    np.testing.assert_array_equal(*commands)
+    assert (np.abs(gaps_m[0] - gaps_m[1]) > 0.01).all()
+
+
+def test_where_people_are_estimated_to_be_changes_the_shield_and_not_incidents():
+    told, allowed = [], []
+    for perception in ("truth", "keypoints"):
+        envs = vector(6, None, perception=perception)
+        for infos, now in steps(envs, 100, seed=18_004_200, agent="random"):
+            told.append({k: v for k, v in infos.items() if k.startswith("safety/")})
+            allowed.append(limit_command(now, now.command, 0.04, ShieldConfig("pfl"))[0])
+    for exact, seen in zip(told[:100], told[100:], strict=True):
+        assert exact.keys() == seen.keys()
+        for name in exact:
+            np.testing.assert_array_equal(exact[name], seen[name])
+    assert np.abs(np.array(allowed[:100]) - allowed[100:]).max() > 1e-2
 
 
 @pytest.mark.parametrize(
