@@ -197,7 +197,7 @@ class AdversaryArguments(BenchArguments):
 
     A cross-entropy search finds times, places and speeds of reaches for the scripted robot with the
     shield qp and for one without a shield. On other seeds, such people are compared with people who
-    are unaware of the robot. The folder also receives reaches.json with the reaches that were found.
+    are unaware of the robot. The reaches that were found are written to reaches.json in the folder.
     """
 
     out: Path = Path("out/bench_adversary")
@@ -252,8 +252,8 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed, motion, rare and adversary. Each takes --quick (minutes
-    instead of hours) and --out DIR, a folder for report.html, results.json and figures.
+    The benchmarks are tracking, perception, speed, motion, rare and adversary. Each takes --quick
+    (minutes instead of hours) and --out DIR, a folder for report.html, results.json and figures.
     `tracking --help`, for example, describes the other options.
     """
 

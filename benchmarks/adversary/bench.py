@@ -6,7 +6,7 @@ robot moves towards the worker or, if there are none, to the shortest time to co
 and targets are within the ranges of other people (`hrc_env/motion/reaches.py`), and the script does
 not depend on the robot: the worker does not watch it. What the search finds is then compared with
 people who are unaware of the robot, on other seeds. Such searches for the worst people are also
-called adaptive stress testing (Lee et al. 2020, doi:10.1613/jair.1.12190).
+called adaptive stress testing (Lee et al. 2020, arXiv:1811.02188).
 
 The folder then contains `reaches.json` with the distributions that were found and the worst episode
 of each search. The package plays those in `assets/adversary/reaches.json` for `people="adversary"`.
@@ -314,8 +314,8 @@ TABLE = Table(
     ),
     ("shield", "people"),
     "The agent `scripted` in `HRCReach-v0` with four cameras, {n[qp.unaware.closest]} episodes of "
-    "10 s per row, with the same seeds in all rows; contacts and interventions per hour. Each shield "
-    "has its own search. Closest: quantile .1 of the shortest true distance of an episode.",
+    "10 s per row, with the same seeds in all rows; contacts and interventions per hour. Each "
+    "shield has its own search. Closest: quantile .1 of the shortest true distance of an episode.",
     conditions=Conditions(
         people="as in the table", scene="`lab`", perception="`keypoints`",
         chosen_on=f"reaches were searched on seeds {SEARCH_SEED:,} to "

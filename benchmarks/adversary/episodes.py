@@ -60,7 +60,10 @@ def score_scripts(
 
 
 def _score_together(
-    scripts: Sequence[Script], first_seed: int, env: Mapping[str, Any], tick: Callable[[float], None]
+    scripts: Sequence[Script],
+    first_seed: int,
+    env: Mapping[str, Any],
+    tick: Callable[[float], None],
 ) -> Floats:
     """Return the scores of scripts that are played as one batch; see `score_scripts`."""
     n = len(scripts)

@@ -265,9 +265,9 @@ def take_first_place(decision: Decision) -> None:
     """Choose the job and the workplace with which a worker begins an episode.
 
     With probability `MotionConfig.near_probability`, and with a script, it is the job at the robot,
-    otherwise a random job that begins an errand. If its workplaces are taken, the job at the robot and all jobs that
-    begin errands are tried in turn. If a first activity is prescribed, only the jobs of this
-    activity are tried. If no workplace is free, the worker begins without an errand at the location
+    otherwise a random job that begins an errand. If its workplaces are taken, the job at the robot
+    and all jobs that begin errands are tried in turn. If a first activity is prescribed, only the
+    jobs of this activity are tried. If no workplace is free, the worker begins without an errand at the location
     farthest from the other workers.
 
     Args:

@@ -8,6 +8,7 @@ for other people. A script can be given, or sampled for each episode from a dist
 """
 
 from dataclasses import astuple, dataclass, fields
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -118,7 +119,7 @@ def check_script(script: Script, limits: ReachLimits) -> None:
             f"reaches[0].start_s must be {LEAD_S} s or more, as a worker begins the episode "
             f"standing, got {starts[0]}."
         )
-    for k, (before_s, after_s) in enumerate(zip(starts, starts[1:], strict=False)):
+    for k, (before_s, after_s) in enumerate(pairwise(starts)):
         if after_s - before_s < APART_S - 1e-9:
             raise ConfigError(
                 f"reaches[{k + 1}].start_s must be {before_s + APART_S:.4g} s or more, {APART_S} s "
