@@ -267,8 +267,8 @@ def take_first_place(decision: Decision) -> None:
     With probability `MotionConfig.near_probability`, and with a script, it is the job at the robot,
     otherwise a random job that begins an errand. If its workplaces are taken, the job at the robot
     and all jobs that begin errands are tried in turn. If a first activity is prescribed, only the
-    jobs of this activity are tried. If no workplace is free, the worker begins without an errand at the location
-    farthest from the other workers.
+    jobs of this activity are tried. If no workplace is free, the worker begins without an errand at
+    the location farthest from the other workers.
 
     Args:
         decision: inputs of the decision; its worker's `job`, `place_kind`, `place` and, at a

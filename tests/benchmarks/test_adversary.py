@@ -11,6 +11,7 @@ from benchmarks.adversary.bench import QUICK, AdversaryBench, find_worst, search
 from benchmarks.adversary.cross_entropy import CrossEntropy
 from benchmarks.adversary.episodes import NEVER_S, make_env, make_people, score_scripts
 from hrc_env.core.errors import ConfigError
+from hrc_env.engines.local import Serial
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.reaches import make_script
@@ -29,7 +30,8 @@ def test_the_search_finds_the_best_parameters(noise):
     for _ in range(25):
         samples = normal.draw(200, rng)
         off = np.square(samples - best).sum((1, 2))
-        normal = search.update(normal, samples, -np.minimum(off, 0.5) + noise * rng.normal(size=200))
+        scores = -np.minimum(off, 0.5) + noise * rng.normal(size=200)
+        normal = search.update(normal, samples, scores)
     np.testing.assert_allclose(normal.mean, best, atol=0.06)
     assert (normal.deviation < 0.12).all()
     assert (normal.deviation >= search.min_deviation).all()
@@ -85,6 +87,7 @@ def test_the_worst_episode_is_the_one_that_is_filmed():
     assert again["contacts_towards"] == worst["score"] >= 1
 
 
+@pytest.mark.slow
 def test_the_benchmark_writes_what_it_found_and_goes_on_after_a_stop(tmp_path, monkeypatch):
     short = replace(QUICK, n_judged=3)
     whole = run_experiment(short, tmp_path / "whole")
@@ -97,7 +100,7 @@ def test_the_benchmark_writes_what_it_found_and_goes_on_after_a_stop(tmp_path, m
         return searched(*args)
 
     monkeypatch.setattr(bench, "search_once", fail)
-    engine = bench_engine()
+    engine = Serial()
     with pytest.raises(KeyboardInterrupt):
         run_experiment(short, tmp_path / "stopped", engine=engine)
     parts = sorted(path.name for path in (tmp_path / "stopped" / "parts").iterdir())
@@ -119,13 +122,6 @@ def test_the_benchmark_writes_what_it_found_and_goes_on_after_a_stop(tmp_path, m
     for row in ("qp.unaware", "qp.adversary", "none.unaware", "none.adversary"):
         rate = whole[f"{row}.towards_per_hour"]
         assert rate.low <= rate.value < rate.high
-
-
-def bench_engine():
-    """An engine that runs all parts in this process."""
-    from hrc_env.engines.local import Serial
-
-    return Serial()
 
 
 def test_a_film_needs_found_reaches(tmp_path):

@@ -275,7 +275,7 @@ def test_the_package_has_reaches_for_every_shield_that_was_searched():
     ({"versions": {"motion": 0}}, "motion 0"),
     ({"versions": {}}, "KeyError"),
     ({"distributions": {"qp": {}}}, "lacks"),
-    ({"distributions": dict.fromkeys(FOUND, {"mean": [[2] * 6], "deviation": [[0] * 6]})},
+    ({"distributions": {key: {"mean": [[2] * 6], "deviation": [[0] * 6]} for key in FOUND}},
      "fractions"),
     ({"distributions": {"qp": 3, "none": 4}}, "must be found reaches"),
     (None, "must be found reaches"),
