@@ -16,7 +16,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.versions import read_versions
 from hrc_env.motion.config import FOUND, MotionConfig
-from hrc_env.motion.reaches import ReachDistribution, Script, check_script, draw_script
+from hrc_env.motion.reaches import ReachDistribution, Script, draw_script
 from hrc_env.worker.body import assets_dir
 
 COMMAND = "python -m benchmarks adversary"
@@ -59,8 +59,6 @@ def make_reaches(
             )
     if isinstance(reaches, str):
         return load_found_reaches()[reaches]
-    if isinstance(reaches, tuple):
-        check_script(reaches, config.reach_limits)
     return reaches
 
 
