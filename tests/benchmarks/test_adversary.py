@@ -81,9 +81,8 @@ def test_the_worst_episode_is_the_one_that_is_filmed():
     found = search_once("none", search, search.begin((6, 6)), FIRST + 100, tick)
     worst = find_worst([found, {"worst": {"score": -1.0}}])
     script = tuple(bench.Reach(**each) for each in worst["reaches"])
-    again = bench.judge(
-        {**make_env(None), "people": make_people(script)}, worst["seed"], 1, tick
-    )["episodes"][0]
+    env = {**make_env(None), "people": make_people(script)}
+    (again,) = bench.judge(env, worst["seed"], 1, tick)["episodes"]
     assert again["contacts_towards"] == worst["score"] >= 1
 
 
