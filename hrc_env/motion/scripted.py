@@ -50,7 +50,7 @@ def make_reaches(
     for invalid, valid in (
         (f"n_workers={n_workers}" if n_workers > 1 else "", "n_workers=1 or 0"),
         ("motions" if config.motions else "", "no motions"),
-        ("a mobile robot" if is_mobile else "", "a robot arm, as in HRCReach-v0"),
+        ("a mobile robot" if is_mobile else "", "a robot arm"),
     ):
         if invalid:
             raise ConfigError(
