@@ -1,7 +1,7 @@
 """The command `python -m benchmarks`.
 
-It runs the benchmarks of the estimators, the detector, the speed, the motion of workers and rare
-contacts, and renders a gallery.
+It runs the benchmarks of the estimators, the detector, the speed, the motion of workers, rare
+contacts and people searched for contacts, and renders a gallery.
 """
 
 import sys
@@ -192,6 +192,44 @@ class RareArguments(BenchArguments):
 
 
 @dataclass(frozen=True)
+class AdversaryArguments(BenchArguments):
+    """Search for reaches of a worker that lead to contacts, and count contacts with them.
+
+    A cross-entropy search finds times, places and speeds of reaches for the scripted robot with the
+    shield qp and for one without a shield. On other seeds, such people are compared with people who
+    are unaware of the robot. The reaches that were found are written to reaches.json in the folder.
+    """
+
+    out: Path = Path("out/bench_adversary")
+    iterations: int | None = None
+    """Number of iterations of each search (default: 10, quick: 2)."""
+    samples: int | None = None
+    """Number of scripts per iteration (default: 256, quick: 16)."""
+    episodes: int | None = None
+    """Number of episodes of each row of the table (default: 1000, quick: 16)."""
+    film: bool = False
+    """Afterwards, film the worst episode of each search, as worst_SHIELD.mp4 in the folder."""
+
+    def run(self) -> int:
+        """Run the benchmark, print its table and write films; return the exit status."""
+        check_at_least("--iterations", self.iterations, 1)
+        check_at_least("--samples", self.samples, 12)
+        check_at_least("--episodes", self.episodes, 1)
+        from benchmarks.adversary.bench import QUICK, AdversaryBench, film_worst
+
+        config = override(
+            QUICK if self.quick else AdversaryBench(),
+            n_iterations=self.iterations,
+            n_samples=self.samples,
+            n_judged=self.episodes,
+        )
+        status = self.show(config)
+        if self.film:
+            film_worst(self.out, Console().print)
+        return status
+
+
+@dataclass(frozen=True)
 class Gallery:
     """Render all workers, a film strip of each motion, and both scenes from all cameras."""
 
@@ -214,8 +252,8 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed, motion and rare. Each takes --quick (minutes
-    instead of hours) and --out DIR, a folder for report.html, results.json and figures.
+    The benchmarks are tracking, perception, speed, motion, rare and adversary. Each takes --quick
+    (minutes instead of hours) and --out DIR, a folder for report.html, results.json and figures.
     `tracking --help`, for example, describes the other options.
     """
 
@@ -225,6 +263,7 @@ class Benchmarks:
         | Annotated[SpeedArguments, tyro.conf.subcommand("speed")]
         | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
         | Annotated[RareArguments, tyro.conf.subcommand("rare")]
+        | Annotated[AdversaryArguments, tyro.conf.subcommand("adversary")]
         | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     )
     """Benchmark to run."""

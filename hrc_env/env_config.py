@@ -74,8 +74,8 @@ class EnvConfig:
     """Number of workers, at least 0, or a range (min, max) from which it is sampled for every
     episode; the observation has slots for the maximum. None for the task's default."""
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
-    """Behaviour of workers towards the robot: "attentive", "hurried", "unaware", "headlong", a
-    `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
+    """Behaviour of workers towards the robot: "attentive", "hurried", "unaware", "headlong",
+    "adversary", a `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
     motions: "Sequence[str | Path | Clip] | None" = field(default=None, metadata=MANY)
     """Clips of recorded motion, or their paths, which workers play in addition to synthetic motion
     (docs/motion_capture.md); None for the value in `config` (no clips)."""

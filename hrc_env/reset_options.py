@@ -23,6 +23,7 @@ from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.reach import check_reach
 from hrc_env.motion.config import PeopleConfig, make_hand_params
 from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, group_jobs
+from hrc_env.motion.scripted import make_reaches
 from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.perception.faults.fault import FaultConfig, check_cameras
 from hrc_env.pipeline.levels import CAMERA_LEVELS, check_supported
@@ -304,7 +305,7 @@ def _cast(given: Options, room: Room) -> Cast | None:
         n,
         None if bodies is None else tuple(map(room.bodies.index, bodies)),
         None if activities is None else tuple(map(_activity_index, activities)),
-        _mind(given.get("people"), room.mind),
+        _mind(given.get("people"), room.mind, most),
     )
 
 
@@ -326,13 +327,22 @@ def _one_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
     return list(value)
 
 
-def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
-    """Return the behaviour parameters for the option `people`; None without the option."""
+def _mind(people: Any, mind: BehaviourParams, n_workers: int) -> BehaviourParams | None:
+    """Return the behaviour parameters for the option `people`; None without the option.
+
+    Args:
+        people: value of the option.
+        mind: behaviour parameters of the environment.
+        n_workers: maximum number of workers of the environment.
+    """
     if people is None:
         return None
     config = replace(mind.config, people=convert_to_hint(PeopleConfig, people, "people"))
     return replace(
-        mind, config=config, hand_params=make_hand_params(config, mind.hand_params.robot_xy_m)
+        mind,
+        config=config,
+        hand_params=make_hand_params(config, mind.hand_params.robot_xy_m),
+        reaches=make_reaches(config, n_workers, mind.robot_girth_m > 0.0),
     )
 
 

@@ -15,6 +15,7 @@ from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.blending import join, leave, place_standing
 from hrc_env.motion.decision import Decision, MotionState, take_first_place
+from hrc_env.motion.reaches import LEAD_S, find_next_reach
 from hrc_env.motion.schedule import HERE, pick_job
 from hrc_env.motion.setting_out import (
     Action,
@@ -25,7 +26,7 @@ from hrc_env.motion.setting_out import (
     set_out,
     step_back,
 )
-from hrc_env.motion.starting import start_here
+from hrc_env.motion.starting import start_here, start_scripted_reach
 from hrc_env.motion.state import NOWHERE, THERE, UNDER_WAY, WAITING
 from hrc_env.worker.props import PROP_NAMES
 
@@ -59,7 +60,10 @@ def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> No
     pace, clock_s, time_s = float(worker.pace), float(worker.clock_s), float(worker.time_s)
     end = 0.0 if pace < 0.0 else float(worker.duration_s)
     over = (time_s - end) / pace if pace != 0.0 else 0.0
-    decision = Decision(state.mind_of(b), workers, w, draws, clock_s - over, state.loads[b])
+    decision = Decision(
+        state.mind_of(b), workers, w, draws, clock_s - over, state.loads[b],
+        script=state.scripts.get(b, ()),
+    )  # fmt: skip
     leave(end, decision.clock_s, frames, worker)
     if worker.activity in (st.SET_DOWN, st.PUSH):
         lying.lay_down_load(decision.loads, state.mind.plan.grounds.places, worker)
@@ -99,7 +103,10 @@ def begin_episode(
     workers["place"][:, :2] = np.inf
     workers["pace"] = workers["wanted_pace"] = 1.0
     everyone = [
-        Decision(mind, workers, w, draws[w, 0], 0.0, state.loads[b]) for w in range(len(workers))
+        Decision(
+            mind, workers, w, draws[w, 0], 0.0, state.loads[b], script=state.scripts.get(b, ())
+        )
+        for w in range(len(workers))
     ]
     for decision, activity in zip(everyone, activities, strict=False):
         decision.first_activity = None if activity == dc.ANY_ACTIVITY else activity
@@ -118,7 +125,10 @@ def begin_episode(
     for decision in everyone[:n_present]:
         share = decision.draws.item(dc.PLACES - 1)
         decision.draws = draws[decision.w, 1]
-        _store_action(decision, _begin_job(decision))
+        scripted = None if decision.first_activity is not None else _follow_script(decision)
+        _store_action(decision, scripted or _begin_job(decision))
+        if scripted:
+            continue
         decision.worker.time_s = math.floor(1e6 * share * float(decision.worker.duration_s)) * 1e-6
 
 
@@ -137,6 +147,8 @@ def choose_activity(decision: Decision) -> Action:
         return _begin_standing(left)
     if action := begin_clip(decision):
         return action
+    if worker.travel == THERE and (action := _follow_script(decision)):
+        return action
     if worker.travel == UNDER_WAY and has_arrived(decision):
         decision.set_travel(THERE)
         return _begin_job(decision)
@@ -150,6 +162,21 @@ def choose_activity(decision: Decision) -> Action:
         decision.set_travel(WAITING)
         worker.waiting_since_s = decision.clock_s
     return set_out(decision) or _begin_waiting(decision)
+
+
+def _follow_script(decision: Decision) -> Action | None:
+    """Begin the next reach of the script, or stand until then.
+
+    Returns:
+        The reach or the pause; None if no reach is left, or if the worker cannot reach from here.
+    """
+    reach = find_next_reach(decision.script, decision.clock_s)
+    if reach is None or decision.kind_here != "robot" or decision.is_loaded:
+        return None
+    wait_s = reach.start_s - decision.clock_s
+    if wait_s > LEAD_S + 1e-9:
+        return Action(st.STAND, wait_s - LEAD_S)
+    return Action(st.REACH, start_scripted_reach(decision, reach))
 
 
 def _store_action(decision: Decision, action: Action) -> None:

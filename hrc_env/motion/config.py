@@ -1,18 +1,26 @@
 """Settings of the workers' motion, and presets of their behaviour near the robot."""
 
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.points import Point
+from hrc_env.motion.reaches import (
+    HOLD_S,
+    Range,
+    Reach,
+    ReachDistribution,
+    ReachLimits,
+    check_script,
+)
 from hrc_env.motion.schedule import JOBS, Job, check_jobs
 
-Range = tuple[float, float]
-"""A range (minimum, maximum)."""
+FOUND = ("qp", "none")
+"""Names of the shields of the robots against which reaches were searched; "none" for no shield."""
 
 
 @answer_unknown_fields
@@ -58,13 +66,22 @@ class PeopleConfig:
     """Speed of a run [m/s]; 2.5 m/s requires a path of 2.4 m, and 3.5 m/s a path of 4.4 m."""
     careless_probability: float = 0.01
     """Probability that a worker steps back without looking between two tasks."""
+    reaches: str | tuple[Reach, ...] | ReachDistribution = ()
+    """Script of the worker's reaches at the robot, a tuple of `Reach`; or a `ReachDistribution`,
+    from which every episode samples a script; or "qp" or "none", the distribution that
+    `python -m benchmarks adversary` found for the scripted robot with this shield or without one.
+    After its last reach, and if the worker is not at the robot, it behaves like other people. A
+    script requires a robot arm, at most one worker and no `motions`."""
 
     def __post_init__(self) -> None:
         """Check that ranges and probabilities are within their bounds."""
         _check_ranges(self)
-        for name, value in asdict(self).items():
+        for name in (each.name for each in fields(self) if each.name != "reaches"):
+            value = getattr(self, name)
             if np.min(value) < 0.0:
                 raise ConfigError(f"{name} must be 0 or more, got {value}.")
+        if isinstance(self.reaches, str):
+            check_names("reaches", [self.reaches], FOUND)
         if self.pause_probability + self.step_back_probability > 1.0:
             raise ConfigError("pause_probability + step_back_probability must be at most 1.")
         if not 0.3 <= self.speed_m_s[0] <= self.speed_m_s[1] <= 2.0:
@@ -85,6 +102,17 @@ def _check_ranges(config: "PeopleConfig | MotionConfig") -> None:
             raise ConfigError(f"{name} must lie in [0, 1], got {value}.")
 
 
+_UNAWARE = PeopleConfig(
+    notice_m=0.0,
+    fast_m_s=99.0,
+    pause_probability=0.0,
+    step_back_probability=0.0,
+    detour_m=0.0,
+    sudden_probability=0.08,
+    lunge_probability=0.02,
+    stumble_probability=0.01,
+    careless_probability=0.04,
+)
 PEOPLE: dict[str, PeopleConfig] = {
     "attentive": PeopleConfig(),
     "hurried": PeopleConfig(
@@ -101,17 +129,7 @@ PEOPLE: dict[str, PeopleConfig] = {
         stumble_probability=0.03,
         careless_probability=0.02,
     ),
-    "unaware": PeopleConfig(
-        notice_m=0.0,
-        fast_m_s=99.0,
-        pause_probability=0.0,
-        step_back_probability=0.0,
-        detour_m=0.0,
-        sudden_probability=0.08,
-        lunge_probability=0.02,
-        stumble_probability=0.01,
-        careless_probability=0.04,
-    ),
+    "unaware": _UNAWARE,
     "headlong": PeopleConfig(
         speed_m_s=(1.1, 1.6),
         tempo=0.4,
@@ -119,11 +137,13 @@ PEOPLE: dict[str, PeopleConfig] = {
         fall_probability=0.3,
         run_probability=0.6,
     ),
+    "adversary": replace(_UNAWARE, reaches="qp"),
 }
 """Presets of people by name.
 
 "attentive" workers watch the robot, "hurried" workers react to it less often, and "unaware" workers
-ignore it; "headlong" workers watch the robot, but sometimes run and fall.
+ignore it; "headlong" workers watch the robot, but sometimes run and fall. An "adversary" ignores
+the robot and reaches where and when a search found contacts with the robot to be most likely.
 """
 
 
@@ -205,9 +225,22 @@ class MotionConfig:
                 f"{self.spacing_m}."
             )
         check_jobs(self.jobs)
+        if isinstance(self.people.reaches, tuple):
+            check_script(self.people.reaches, self.reach_limits)
         for motion in self.motions:
             if not isinstance(motion, str | Clip):
                 raise ConfigError(f"motions must be paths or clips, got {motion!r}.")
+
+    @property
+    def reach_limits(self) -> ReachLimits:
+        """Ranges of the parameters of scripted reaches, from which other reaches are sampled."""
+        return ReachLimits(
+            radius_m=self.target_radius_m,
+            azimuth_rad=(-self.target_spread_rad, self.target_spread_rad),
+            z_m=self.target_z_m,
+            peak_m_s=(self.hand_speed_m_s[0], self.sudden_speed_m_s),
+            hold_s=(HOLD_S, self.hold_s[1]),
+        )
 
 
 class HandParams(NamedTuple):

@@ -18,6 +18,7 @@ from hrc_env.motion.config import HandParams, MotionConfig
 from hrc_env.motion.floorplan import CELL_M, Floorplan, locate_beside_robot, read_slack
 from hrc_env.motion.lying import Load
 from hrc_env.motion.points import Place
+from hrc_env.motion.reaches import ReachDistribution, Script
 from hrc_env.motion.schedule import HERE, Job, Schedule
 from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, UNDER_WAY, WAITING, Worker
 from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_APART_M, HANDS_M
@@ -63,6 +64,8 @@ class BehaviourParams:
     """Minimum number of workers in an episode."""
     robot_girth_m: float = 0.0
     """Radius of a mobile robot around its two points that workers watch [m]; 0 for an arm."""
+    reaches: Script | ReachDistribution = ()
+    """Script of the worker's reaches, or the distribution from which episodes sample scripts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +94,8 @@ class MotionState:
     """Constants of the behaviour."""
     minds: dict[int, BehaviourParams] = field(default_factory=dict)
     """Constants of the environments with a custom behaviour in this episode, by environment."""
+    scripts: dict[int, Script] = field(default_factory=dict)
+    """Scripts of the environments with scripted reaches in this episode, by environment."""
 
     def mind_of(self, b: int) -> BehaviourParams:
         """Return the constants of the current episode of environment b."""
@@ -104,6 +109,7 @@ class MotionState:
             batching.gather([part.loads for part in parts], bounds, ids),
             parts[0].mind,
             batching.gather_entries([part.minds for part in parts], bounds, ids),
+            batching.gather_entries([part.scripts for part in parts], bounds, ids),
         )
 
 
@@ -127,6 +133,8 @@ class Decision:
     """Prop that the worker holds at the decision, an index into `PROPS`."""
     first_activity: int | None = None
     """Activity with which the worker must begin the episode; None for any."""
+    script: Script = ()
+    """Script of the worker's reaches; empty for random reaches."""
 
     @property
     def worker(self) -> Worker:
@@ -256,11 +264,11 @@ def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
 def take_first_place(decision: Decision) -> None:
     """Choose the job and the workplace with which a worker begins an episode.
 
-    With probability `MotionConfig.near_probability` it is the job at the robot, otherwise a random
-    job that begins an errand. If its workplaces are taken, the job at the robot and all jobs that
-    begin errands are tried in turn. If a first activity is prescribed, only the jobs of this
-    activity are tried. If no workplace is free, the worker begins without an errand at the location
-    farthest from the other workers.
+    With probability `MotionConfig.near_probability`, and with a script, it is the job at the robot,
+    otherwise a random job that begins an errand. If its workplaces are taken, the job at the robot
+    and all jobs that begin errands are tried in turn. If a first activity is prescribed, only the
+    jobs of this activity are tried. If no workplace is free, the worker begins without an errand at
+    the location farthest from the other workers.
 
     Args:
         decision: inputs of the decision; its worker's `job`, `place_kind`, `place` and, at a
@@ -269,6 +277,7 @@ def take_first_place(decision: Decision) -> None:
     config, schedule, worker = decision.mind.config, decision.mind.schedule, decision.worker
     robot_job, errand_jobs = schedule.robot, [choice.job for choice in schedule.begins]
     is_at_robot = decision.draws.item(NEXT) < config.near_probability or not errand_jobs
+    is_at_robot |= bool(decision.script)
     preferred_job = robot_job
     if not is_at_robot:
         preferred_job = errand_jobs[int(decision.draws[BOW] * len(errand_jobs))]

@@ -39,6 +39,7 @@ from hrc_env.motion.lying import LOAD, Load, make_loads, reset_loads
 from hrc_env.motion.points import Point
 from hrc_env.motion.reactions import NoticeParams, follow_signal, notice_robot
 from hrc_env.motion.schedule import make_schedule
+from hrc_env.motion.scripted import draw_reaches, make_reaches
 from hrc_env.motion.state import Worker
 from hrc_env.worker.body import N_SEGMENTS, Body
 from hrc_env.world import FOOT_M, Grounds, WorkerProgress, WorkerSignal, Workplace
@@ -160,9 +161,11 @@ def make_state(
             0 for an arm.
 
     Raises:
-        ConfigError: the floor has no room for this number of workers, or for a clip.
+        ConfigError: the floor has no room for this number of workers, or for a clip, or a script
+            of reaches is invalid.
     """
     fewest = n_workers if fewest is None else fewest
+    reaches = make_reaches(config, n_workers, robot_girth_m > 0.0)
     bones, plan = measure_bodies(body), make_floorplan(grounds)
     fit = count_room(plan, config.spacing_m)
     if n_workers > fit:
@@ -176,7 +179,7 @@ def make_state(
     pieces = cut_clips(clips, bones.lengths, make_stage(plan, config))
     loads = make_loads(grounds.places, schedule.jobs)[: None if n_workers else 0]
     mind = BehaviourParams(
-        config, hand_params, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
+        config, hand_params, plan, schedule, pieces, bones, loads, fewest, robot_girth_m, reaches
     )
     # One more row per worker, because each may bring or receive a load.
     rows = np.zeros((batch, len(loads) + n_workers), LOAD)
@@ -208,10 +211,21 @@ def reset(
         reset_loads(state.loads[b], state.mind.loads, rngs[b].spawn(1)[0])
         draws = rngs[b].random((n_workers, 2, N_DRAWS))
         state.minds.pop(b, None)
+        mind = casts[b].mind if b in casts else None
+        _begin_script(state, b, state.mind if mind is None else mind, rngs[b])
         if b in casts:
             _begin_cast_episode(state, b, n, bodies, draws, casts[b], rngs[b])
         else:
             begin_episode(state, b, n, bodies, draws)
+
+
+def _begin_script(
+    state: MotionState, b: int, mind: BehaviourParams, rng: np.random.Generator
+) -> None:
+    """Store the script of an episode of environment b, if its worker has one."""
+    state.scripts.pop(b, None)
+    if script := draw_reaches(mind.reaches, mind.config, rng):
+        state.scripts[b] = script
 
 
 def _begin_cast_episode(

@@ -18,6 +18,7 @@ from hrc_env.motion.feet import place_feet
 from hrc_env.motion.hands import LiftTimes, plan_lift, plan_reach
 from hrc_env.motion.points import Point, Sides
 from hrc_env.motion.posture import locate_ahead
+from hrc_env.motion.reaches import Reach
 from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.props import PROP_NAMES
@@ -242,6 +243,26 @@ def start_reach(
     fidget_m, fidget_hz = 0.035 * draws[9] * draws[9], 0.6 + 0.8 * draws[10]
     worker.out_at = 0.05 if sudden else 0.1 + 0.5 * draws[11]
     return plan_reach(Vector3(x, y, z), used, peak, hold, fidget_m, fidget_hz, worker)
+
+
+def start_scripted_reach(decision: Decision, reach: Reach) -> float:
+    """Plan a scripted reach with the hand on the side of its target; return its duration [s].
+
+    Args:
+        decision: inputs of the decision, at most `reaches.LEAD_S` before the start of the reach.
+        reach: the reach.
+    """
+    worker, base = decision.worker, decision.mind.hand_params.robot_xy_m
+    place_feet(0.0, worker)
+    away_m = math.hypot(worker.start_x - base.x, worker.start_y - base.y)
+    azimuth = math.atan2(worker.start_y - base.y, worker.start_x - base.x) + reach.azimuth_rad
+    radius_m = min(reach.radius_m, away_m - BODY_M)
+    x, y = base.x + radius_m * math.cos(azimuth), base.y + radius_m * math.sin(azimuth)
+    side = wrap(math.atan2(y - worker.start_y, x - worker.start_x) - worker.start_yaw)
+    used = Sides(1.0, 0.0) if side > 0.0 else Sides(0.0, 1.0)
+    worker.out_at = max(reach.start_s - decision.clock_s, 0.0)
+    target = Vector3(x, y, float(reach.z_m))
+    return plan_reach(target, used, float(reach.peak_m_s), float(reach.hold_s), 0.0, 1.0, worker)
 
 
 @kernel

@@ -870,7 +870,10 @@ def default_settings() -> Arrays:
     """Return the numbers of the workers' settings, and of every kind of people."""
     plain = motion_config.MotionConfig()
     numbers = {f"motion/{name}": getattr(plain, field) for name, field in MOTION_FIELDS.items()}
+    scripted = "adversary"  # other people with a script: as many numbers as "unaware", the same
     for kind, people in motion_config.PEOPLE.items():
+        if kind == scripted:
+            continue
         for name, field in PEOPLE_FIELDS.items():
             numbers[f"{kind}/{name}"] = getattr(people, field)
     return {name: np.atleast_1d(np.array(value, float)) for name, value in numbers.items()}
