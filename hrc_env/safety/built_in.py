@@ -26,12 +26,13 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import require
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms, Velocities3
 from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.enclosure import (
     CAPSULES,
+    BodyCapsules,
     enclose,
     find_shares,
     find_velocities,
@@ -50,7 +51,7 @@ from hrc_env.safety.constraints import (
     add_worker_constraints,
 )
 from hrc_env.safety.contact import CAPSULE_REGIONS, permitted_contact_speed
-from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, find_support
+from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, Support, find_support
 from hrc_env.safety.solver import Problem, constraint_violation, solve
 from hrc_env.safety.unseen import HAND_M, find_undetected
 
@@ -82,8 +83,21 @@ class ArmPose:
     """Index of the link that carries each capsule (K,)."""
 
 
+class KnownBodies(NamedTuple):
+    """Bodies whose surfaces are known instead of estimated, for upper bounds on performance."""
+
+    capsules: BodyCapsules
+    """Capsules of the bodies (B, W, S, ...)."""
+    velocity_world: Velocities3
+    """Velocities of the ends of the capsules (B, W, S, 2, 3) [m/s]."""
+
+
 def limit_command(
-    belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
+    belief: Belief,
+    velocities: JointVelocities,
+    dt_s: float,
+    config: ShieldConfig,
+    known: KnownBodies | None = None,
 ) -> ShieldOutput:
     """Return the safe joint velocities nearest to the given ones; implements `shield.Shield`.
 
@@ -98,12 +112,13 @@ def limit_command(
         velocities: (B, N) joint velocities of the agent [rad/s].
         dt_s: time until the next command [s].
         config: kind, margins and limits.
+        known: bodies to use instead of the estimated ones; None without such knowledge.
 
     Raises:
         ConfigError: the belief lacks the `RobotModel` or the current command.
     """
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
-    found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
+    found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config, known)
     limit = partial(limit_speed, pose.frames, pose.model.chain.slides, pose.links,
                     belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
     wanted, allowed, slack = velocities.copy(), np.empty_like(velocities), np.empty(len(velocities))
@@ -137,6 +152,7 @@ def build_constraints(
     wanted: JointVelocities,
     dt_s: float,
     config: ShieldConfig,
+    known: KnownBodies | None = None,
 ) -> Constraints:
     """Return the tightest constraints on the joint velocities of every robot.
 
@@ -150,6 +166,7 @@ def build_constraints(
         wanted: (B, N) joint velocities of the agent [rad/s].
         dt_s: time until the next command [s].
         config: kind, margins and limits.
+        known: bodies to use instead of the estimated ones, as in `limit_command`.
     """
     model, batch = pose.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
@@ -180,6 +197,9 @@ def build_constraints(
     )
     params, floor = config.make_params(), belief.unseen
     bodies = describe_bodies(belief, pose, is_lost, config, params.bounds)
+    if known is not None:
+        bodies = _replace_bodies(bodies, known)
+        params = params._replace(protrusion_m=np.zeros_like(params.protrusion_m))
     add_worker_constraints(robots, bodies, params, found)
     if floor is not None and np.isfinite(floor.possible_m).any():
         walked_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
@@ -227,6 +247,19 @@ def describe_bodies(
         joints=enclosure.joints,
         shares=find_shares(),
         support=support,
+    )
+
+
+def _replace_bodies(bodies: Bodies, known: KnownBodies) -> Bodies:
+    """Return bodies with known surfaces and without errors; only `min_uncertainty_m` remains."""
+    return bodies._replace(
+        segments=known.capsules.ends_world,
+        radii_m=known.capsules.radius_m,
+        velocity=known.velocity_world,
+        cov=np.zeros_like(bodies.cov),
+        support=Support(
+            bodies.support.factor, np.full_like(bodies.support.age_class, NOT_CALIBRATED)
+        ),
     )
 
 
