@@ -188,7 +188,8 @@ class Price:
             choosing: sums of the episodes of one setup on the choosing seeds, by setting.
         """
         tallies = {name: tally(rows) for name, rows in choosing.items()}
-        return keep_settings(tallies, self.levels_per_hour, self.n_kept)
+        proof_hours = len(self.proof_seeds) * self.count_steps() * DT_S / 3600
+        return keep_settings(tallies, self.levels_per_hour, self.n_kept, proof_hours)
 
     @property
     def reference(self) -> tuple[PriceSetup, Setting]:

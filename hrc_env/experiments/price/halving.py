@@ -3,20 +3,21 @@
 Two sets of seeds are used. On the choosing seeds, all settings are played; at each level, a setting
 has the score
 
-    goals per minute * P(rate <= level),
+    goals per minute * P(the level is shown to be met on the proof seeds),
 
-where P is the probability that the rate of contacts does not exceed the level, given the number of
-contacts (gamma distribution with Jeffreys' prior). The levels keep settings in turns, beginning
-with the strictest: each keeps the one with the highest score at this level that is not yet kept.
+where P is predicted from the number of contacts (Poisson counts, with Jeffreys' prior on their
+rate). The levels keep settings in turns, beginning with the strictest: each keeps the one with the
+highest score at this level that is not yet kept; with equal scores, the one with fewer contacts, or
+else with more goals.
 
 The kept settings are played on the proof seeds. There, they are examined one after the other, in
-the order of P on the choosing seeds: a level is shown to be met if the upper end of the exact 95 %
-interval of the rate does not exceed it, and the examination ends with the first setting for which
-it is not. This order is fixed before the proof seeds are played, so that the probability of any
-false claim is at most 2.5 % per perception setup and level, although several settings are examined
-(fixed sequence testing; Angelopoulos et al. 2021, Learn then test, arXiv:2110.01052). Of the
-settings that are shown to meet the level, the best is the one with the most goals on the choosing
-seeds.
+the order of their rates on the choosing seeds: a level is shown to be met if the upper end of the
+exact 95 % interval of the rate does not exceed it, and the examination ends with the first setting
+for which it is not. This order is fixed before the proof seeds are played, so that the probability
+of any false claim is at most 2.5 % per perception setup and level, although several settings are
+examined (fixed sequence testing; Angelopoulos et al. 2021, Learn then test, arXiv:2110.01052). Of
+the settings that are shown to meet the level, the best is the one with the most goals on the
+choosing seeds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,13 +70,27 @@ class Tally:
         """Upper end of the exact 95 % interval of the rate [1/h]."""
         return estimate_rate([self.contacts], self.hours).high
 
-    def find_probability(self, level_per_hour: float) -> float:
-        """Return the probability that the rate of contacts does not exceed a level [1/h]."""
-        return float(stats.gamma.cdf(level_per_hour * self.hours, self.contacts + 0.5))
+    def predict_success(self, level_per_hour: float, proof_hours: float) -> float:
+        """Return the probability that a level is shown to be met on the proof seeds.
 
-    def rate_score(self, level_per_hour: float) -> float:
-        """Return the goals per minute times the probability that the rate meets a level [1/h]."""
-        return self.goals_per_min * self.find_probability(level_per_hour)
+        Args:
+            level_per_hour: level of the rate of contacts [1/h].
+            proof_hours: duration of the episodes on the proof seeds [h].
+        """
+        most = count_permitted(level_per_hour, proof_hours)
+        share = self.hours / (self.hours + proof_hours)
+        return float(stats.nbinom.cdf(most, self.contacts + 0.5, share))
+
+
+def count_permitted(level_per_hour: float, hours: float) -> int:
+    """Return the largest number of contacts with which a level is shown to be met; -1 if none is.
+
+    Args:
+        level_per_hour: level of the rate of contacts [1/h].
+        hours: duration of the episodes [h].
+    """
+    counts = np.arange(np.ceil(level_per_hour * hours) + 1)
+    return int((stats.gamma.ppf(0.975, counts + 1) <= level_per_hour * hours).sum()) - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +104,10 @@ class Best:
 
 
 def keep_settings(
-    chosen: Mapping[str, Tally], levels_per_hour: Sequence[float], n_kept: int
+    chosen: Mapping[str, Tally],
+    levels_per_hour: Sequence[float],
+    n_kept: int,
+    proof_hours: float,
 ) -> tuple[str, ...]:
     """Return the settings that are played on the proof seeds.
 
@@ -97,12 +115,17 @@ def keep_settings(
         chosen: tallies of all settings on the choosing seeds, by name.
         levels_per_hour: levels of the rate of contacts [1/h].
         n_kept: number of settings to keep.
+        proof_hours: duration of the episodes of a setting on the proof seeds [h].
     """
     levels, kept = sorted(levels_per_hour), list[str]()
+
+    def rank(name: str) -> tuple[float, float, float]:
+        tally, level = chosen[name], levels[len(kept) % len(levels)]
+        score = tally.goals_per_min * tally.predict_success(level, proof_hours)
+        return score, -tally.rate_per_hour, tally.goals_per_min
+
     while len(kept) < min(n_kept, len(chosen)):
-        level = levels[len(kept) % len(levels)]
-        left = [name for name in chosen if name not in kept]
-        kept.append(max(left, key=lambda name: chosen[name].rate_score(level)))
+        kept.append(max((name for name in chosen if name not in kept), key=rank))
     return tuple(kept)
 
 
@@ -120,9 +143,7 @@ def find_best(
     def prefer(name: str) -> float:
         return chosen[name].goals_per_min
 
-    order = sorted(
-        proved, key=lambda name: (-chosen[name].find_probability(level_per_hour), prefer(name))
-    )
+    order = sorted(proved, key=lambda name: (chosen[name].rate_per_hour, prefer(name)))
     passes = [proved[name].max_rate_per_hour <= level_per_hour for name in order]
     n_shown = int(np.argmin([*passes, False]))
     if shown := order[:n_shown]:

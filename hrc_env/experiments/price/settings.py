@@ -1,6 +1,7 @@
 """The settings of the shield that the price study compares for each kind of perception.
 
-They were chosen from the meaning of the settings, before any episode of the study was played.
+They were chosen by their meaning, those for one camera also by 32 episodes on seeds 21,000,000 to
+21,000,031, in which limits near the unknown had hardly any effect, and doubts had a large one.
 """
 
 import warnings
@@ -114,8 +115,8 @@ def _list_cameras() -> list[Setting]:
         _make("constant", "constant margin, 2 sigmas", margin="constant"),
         _make("constant_wider_4cm", "constant margin +4 cm, 2 sigmas", 0.04, margin="constant"),
         _make("sure", "constant margin, 1 sigma, no doubt", base=sure),
-        _make("sure_fast", "the same, 1 m/s near the unknown", unknown_speed_limit_m_s=1.0,
-              base=sure),
+        _make("sure_fast", "1 sigma, no doubt, 1 m/s near the unknown",
+              unknown_speed_limit_m_s=1.0, base=sure),
         _make("fast", "1 m/s near the unknown, margin -4 cm", -0.04, unknown_speed_limit_m_s=1.0),
     ]  # fmt: skip
 
@@ -125,21 +126,19 @@ def _list_one_camera() -> list[Setting]:
     sure = _Changes(margin="constant", single_view_sigmas=0.0)
     return [
         _make("default", "default"),
-        _make("slow", "stops near the unknown", unknown_speed_limit_m_s=0.0),
-        _make("half_fast", "0.5 m/s near the unknown", unknown_speed_limit_m_s=0.5),
+        _make_margin(0.08),
         _make("fast", "1 m/s near the unknown", unknown_speed_limit_m_s=1.0),
-        _make("fast_closer_10cm", "1 m/s near the unknown, margin -10 cm", -0.1,
-              unknown_speed_limit_m_s=1.0),
-        _make("sure", "constant margin, 2 sigmas, no doubt", n_sigmas=2.0, base=sure),
-        _make("sure_half_fast", "the same, 0.5 m/s near the unknown", n_sigmas=2.0,
-              unknown_speed_limit_m_s=0.5, base=sure),
-        _make("sure_fast", "the same, 1 m/s near the unknown", n_sigmas=2.0,
+        _make("constant", "constant margin, 2 sigmas", margin="constant"),
+        _make("half_sure", "constant margin, 2 sigmas, half the doubt", margin="constant",
+              single_view_sigmas=2.5),
+        _make("sure", "constant margin, 2 sigmas, no doubt", base=sure),
+        _make("sure_slow", "2 sigmas, no doubt, stops near the unknown",
+              unknown_speed_limit_m_s=0.0, base=sure),
+        _make("sure_fast", "2 sigmas, no doubt, 1 m/s near the unknown",
               unknown_speed_limit_m_s=1.0, base=sure),
+        _make("sure_wider_5cm", "constant margin +5 cm, 2 sigmas, no doubt", 0.05, base=sure),
+        _make("sure_wider_10cm", "constant margin +10 cm, 2 sigmas, no doubt", 0.1, base=sure),
         _make("surer_fast", "constant margin, 1 sigma, no doubt, 1 m/s", n_sigmas=1.0,
-              unknown_speed_limit_m_s=1.0, base=sure),
-        _make("surest_fast", "constant margin, 0 sigmas, no doubt, 1 m/s", n_sigmas=0.0,
-              unknown_speed_limit_m_s=1.0, base=sure),
-        _make("surest_fast_closer_8cm", "the same, margin -8 cm", -0.08, n_sigmas=0.0,
               unknown_speed_limit_m_s=1.0, base=sure),
     ]  # fmt: skip
 
@@ -153,8 +152,8 @@ def _list_late() -> list[Setting]:
         _make("constant_wider_5cm", "constant margin +5 cm, 2 sigmas", 0.05, margin="constant"),
         _make("sure", "constant margin, 1 sigma, predictions 0.35 m/s", margin="constant",
               n_sigmas=1.0, prediction_growth_m_s=0.35),
-        _make("sure_closer_5cm", "the same, margin -5 cm", -0.05, margin="constant", n_sigmas=1.0,
-              prediction_growth_m_s=0.35),
+        _make("sure_closer_5cm", "1 sigma, predictions 0.35 m/s, margin -5 cm", -0.05,
+              margin="constant", n_sigmas=1.0, prediction_growth_m_s=0.35),
         _make("short", "anticipation 0.2 s", worker_time_s=0.2),
         _make("long", "anticipation 0.4 s", worker_time_s=0.4),
     ]  # fmt: skip
