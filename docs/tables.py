@@ -124,7 +124,8 @@ def _block(found: re.Match[str]) -> str:
         table = replace(table, columns=[each for each in table.columns if each not in missing])
     metrics = result.metrics if found["name"] in RANGES else withhold_intervals(table, result)
     text = table.to_markdown(metrics, intervals=not found["plain"])
-    return "\n\n".join(filter(None, (f"{first}\n{text}", stale))) + "\n<!-- end of results -->"
+    shown = "\n\n".join(filter(None, (text, stale)))
+    return f"{first}\n{shown}\n<!-- end of results -->"
 
 
 def withhold_intervals(table: Table, result: Result) -> Metrics:

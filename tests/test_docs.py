@@ -174,7 +174,7 @@ def test_counts_stand_with_their_intervals():
                 assert cells, (name, column)
                 assert all(INTERVAL.search(each) for each in cells if each != " - "), (name, column)
                 known.add(name)
-    assert len(known) >= 6
+    assert len(known) >= 5
 
 
 def test_the_leaderboard_shows_no_count_without_its_interval():

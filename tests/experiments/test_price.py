@@ -81,8 +81,10 @@ GOALS = np.linspace(47.0, 36.0, 12)
 
 
 def test_halving_keeps_the_best_and_finds_it():
-    """At ten an hour the sixth setting is the best that can be proved, at one an hour the ninth. Two
-    goals less are as good as the choosing seeds can tell."""
+    """At ten an hour the sixth setting is the best that can be proved, at one an hour the ninth.
+
+    Two goals less are as good as the choosing seeds can tell.
+    """
     rng, found = np.random.default_rng(0), {1.0: [], 10.0: []}
     for _ in range(200):
         chosen = draw_tallies(rng, RATES, GOALS, 500)
