@@ -411,6 +411,19 @@ def test_a_part_begins_with_the_first_choice_of_cameras():
     assert whole.make(lambda share: None)["cost"] == split
 
 
+def test_a_part_is_known_by_all_that_it_depends_on():
+    """Otherwise a setting that was changed would keep its old episodes."""
+    config = replace(TINY, setups=tuple(list_setups()), n_settings=12)
+    keys = [
+        part.key
+        for setup in find_setups(config.setups)
+        for setting in config.list_settings(setup).values()
+        for role in (CHOOSING, PROOF)
+        for part in config.make_parts(role, setup, setting)
+    ]
+    assert len(set(keys)) == len(keys) == 8 * 12 * 3
+
+
 def test_every_row_says_everything(end_to_end):
     out, metrics = end_to_end
     for name in TINY.setups:
