@@ -86,11 +86,10 @@ def _replay_impact(given: ReplayInput) -> None:
     walk(impact, given)
 
 
-def _replay_price(command: str, given: ReplayInput) -> None:
+def _replay_price(given: ReplayInput) -> None:
     from hrc_env.experiments.price.experiment import replay
 
-    margins_m = {label: notes["margin_m"] for label, notes in given.notes.items()}
-    replay(_make_experiment(command, given), given.cache, margins_m)
+    replay(_make_experiment("price", given), given.cache, given.notes)
 
 
 def _replay_trueness(given: ReplayInput) -> None:
@@ -122,8 +121,7 @@ REPLAYS: dict[str, Replay] = {
     "under_shield": _replay_command("under_shield", learnt=("",)),
     "kept": _replay_command("kept", row_words=3),
     "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
-    "price": Replay(partial(_replay_price, "price"), row_words=2),
-    "frontier": Replay(partial(_replay_price, "frontier"), row_words=2),
+    "price": Replay(_replay_price, row_words=2),
 }
 """Replays by the name of the command; commands without parts have none."""
 

@@ -69,7 +69,7 @@ class Command:
     tables_in: str = ""
     """Name of the module that declares the command's `TABLES`, if it has no experiment."""
     is_release: bool = False
-    """Whether the command runs only for a release, since it trains policies for hours."""
+    """Whether the command runs only for a release, since it takes hours."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if `depends` is empty or contains an unknown subsystem."""
@@ -90,6 +90,8 @@ PIXELS = ("env", "tracker", "emulator", "detector", "motion")
 """Names of the subsystems that affect episodes at any perception level, including `pixels`."""
 ALL = (*PIXELS, "shield", "agents")
 """Names of all subsystems."""
+PRICE = (*KEYPOINTS, "shield", "agents")
+"""Names of the subsystems that affect the price study, which renders no images."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,13 +228,8 @@ STUDIES: dict[str, Study] = {
             made=ExperimentSource("benchmarks.shielded", "STUDY"),
         ),
         "price": Command(
-            EXPERIMENT + "price --quick", 20, ALL, ("price", "worth"), {"price.png": "price.png"},
-            quick="--seeds 3",
-            made=_find_experiment("price", quick=True),
-        ),
-        "frontier": Command(
-            EXPERIMENT + "price", 120, ALL, ("price_elsewhere",),
-            quick="", is_release=True,
+            EXPERIMENT + "price", 135, PRICE, ("price", "worth"), {"price.png": "frontier.png"},
+            is_release=True,
             made=_find_experiment("price"),
         ),
     }),

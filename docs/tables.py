@@ -81,13 +81,16 @@ def declared(name: str) -> tuple[str, Table]:
 
 
 def read(name: str) -> Result:
-    """Return a table with the numbers of the last run of its command.
+    """Return a table with the numbers of the last run of its command; without a run, with none.
 
     Raises:
         KeyError: no study declares a table of that name.
     """
     command, table = declared(name)
-    whole: dict[str, Any] = json.loads((RESULTS / "whole" / f"{command}.json").read_text())
+    path = RESULTS / "whole" / f"{command}.json"
+    if not path.exists():
+        return Result(table, {}, COMMANDS[command].command, "", {}, ANY, "", "")
+    whole: dict[str, Any] = json.loads(path.read_text())
     return Result(
         table=table,
         metrics={name: Metric(**each) for name, each in whole["metrics"].items()},
@@ -121,7 +124,8 @@ def _block(found: re.Match[str]) -> str:
         table = replace(table, columns=[each for each in table.columns if each not in missing])
     metrics = result.metrics if found["name"] in RANGES else withhold_intervals(table, result)
     text = table.to_markdown(metrics, intervals=not found["plain"])
-    return "\n\n".join(filter(None, (f"{first}\n{text}", stale))) + "\n<!-- end of results -->"
+    shown = "\n\n".join(filter(None, (text, stale)))
+    return f"{first}\n{shown}\n<!-- end of results -->"
 
 
 def withhold_intervals(table: Table, result: Result) -> Metrics:
@@ -155,15 +159,20 @@ def is_exact(metric: Metric) -> bool:
 
 
 def describe_stale(name: str, result: Result) -> str:
-    """Return what the text of a table does not say of its numbers if they are old; "" otherwise.
+    """Return what the text of a table does not say of its numbers if they are old or missing.
+
+    For other tables, the result is "".
 
     Args:
         name: name of the table.
         result: the table with its numbers.
     """
-    from benchmarks.results import explain_stale  # here: it imports this module
+    from benchmarks.results import explain_stale, format_time  # here: it imports this module
 
     command, _ = declared(name)
+    if not result.metrics:
+        duration = format_time(COMMANDS[command].minutes)
+        return f"*Not measured yet: `{result.command}`, about {duration} on two cores.*"
     if not explain_stale(command):
         return ""
     words = ["Numbers of an earlier version (`python -m benchmarks.results --list`)."]
@@ -195,7 +204,7 @@ def provenance(names: list[str]) -> str:
     Returns:
         A sentence if one command made all of them, else a table with a row for each command.
     """
-    found = [read(name) for name in dict.fromkeys(names)]
+    found = [each for each in map(read, dict.fromkeys(names)) if each.metrics]
     sources: dict[tuple[str, ...], list[str]] = {}
     for each in found:
         source = (f"`{each.command}`", _versions(each.version, each.depends), each.date)

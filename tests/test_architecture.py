@@ -23,6 +23,7 @@ TRUTH_READERS = {
     "hrc_env/pipeline/sensor_input.py": "hands it to the sensors of `keypoints` and `truth`",
     "hrc_env/experiments/impact/episodes.py": "counts what came of beliefs",
     "hrc_env/experiments/price/episodes.py": "counts what came of beliefs",
+    "hrc_env/experiments/price/true_bodies.py": "hands true bodies to the shield of an upper bound",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
     "hrc_env/tracking/oracle.py": "copies it into the belief: the one place",
 }

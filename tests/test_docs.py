@@ -121,6 +121,9 @@ def test_a_table_finds_a_number_for_every_column(name):
     result = tables.read(name)
     missing = result.table.list_unmeasured(result.metrics)
     stale = tables.describe_stale(name, result)
+    if not result.metrics:
+        assert f"Not measured yet: `{result.command}`" in stale
+        return
     assert all(column.heading in stale for column in missing)
     shown = [each for each in result.table.columns if each not in missing]
     replace(result.table, columns=shown).check(result.metrics)
@@ -171,7 +174,7 @@ def test_counts_stand_with_their_intervals():
                 assert cells, (name, column)
                 assert all(INTERVAL.search(each) for each in cells if each != " - "), (name, column)
                 known.add(name)
-    assert len(known) >= 6
+    assert len(known) >= 5
 
 
 def test_the_leaderboard_shows_no_count_without_its_interval():
@@ -183,7 +186,12 @@ def test_the_leaderboard_shows_no_count_without_its_interval():
 
 
 def test_every_picture_is_made_by_a_command():
-    made = {name for command in results.COMMANDS.values() for name in command.pictures}
+    made = {
+        name
+        for study, command in results.COMMANDS.items()
+        for name in command.pictures
+        if results.read_results(study)
+    }
     text = (ROOT / "docs" / "make_pictures.py").read_text()
     drawn = {*re.findall(r"^([\w.]+\.(?:jpg|png|webp)) ", text, re.M)} - {"ID.webp"}
     assert made.isdisjoint(drawn)
@@ -326,8 +334,8 @@ MEASURED_LOOKING = re.compile(
     rf"{AMOUNT} ?{UNIT}|{AMOUNT} of (?:the )?{ONE}|factor of {ONE}|{AMOUNT} \({ONE} to"
 )
 SETTINGS = {
-    # Other people's packages; the rate of contacts that was asked for (PriceConfig.level).
-    "README.md": "1.1 GB, 2.0 GB, 5.8 GB, 10.8 times",
+    # Other people's packages.
+    "README.md": "1.1 GB, 2.0 GB, 5.8 GB",
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
     "compare_estimator.md": "40 episodes, 95 %",
     "conventions.md": "0.04 s",

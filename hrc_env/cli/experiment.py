@@ -98,9 +98,10 @@ class ImpactExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class PriceExperiment(AnyExperiment):
-    """Measure the cost of perception at an equal rate of contacts.
+    """Measure the throughput that perception leaves at stated rates of contacts.
 
-    The safety margin of each perception setup is chosen so that the setup reaches that rate.
+    For each perception setup, twelve settings of the shield are compared on some seeds, and the
+    best are played on others. The whole study takes hours.
     """
 
     name = "price"
@@ -109,15 +110,14 @@ class PriceExperiment(AnyExperiment):
     task: str = DEFAULT
     """Id of the environment."""
     seeds: int | None = None
-    """Number of episodes per step of the search for a margin (default: 300). The resulting margin
-    is confirmed by 10 new episodes for every 3 of these (default: 1000; quick: 600)."""
+    """Number of episodes from which settings of the shield are chosen (default: 500, quick: 8). The
+    chosen settings are played on 8 new episodes for each of these (quick: 2)."""
     setups: tuple[str, ...] = ()
-    """Names of the perception setups to compare, for example truth particle one_camera (default:
-    all; quick: 12)."""
+    """Names of the perception setups to compare, for example true_capsules four_cameras one_camera
+    (default: all eight; quick: four)."""
     robots: tuple[str, ...] = ()
     """Agent that controls the robots (default: scripted): random, scripted_slowed, hrc://ID/NAME, a
-    file (.zip, .safetensors) or MODULE:FUNCTION, as in play. If an agent is given, only one task is
-    played."""
+    file (.zip, .safetensors) or MODULE:FUNCTION, as in play."""
     control: str | None = None
     """Control mode of the agent if its file does not name one: joint (default), tool or twist."""
     trust: bool = False
@@ -147,10 +147,10 @@ class Experiment:
     """Run an experiment of the paper or an additional one.
 
     The paper's two experiments are site and lab; impact measures the effect of perception on
-    safety, price the cost of perception at an equal rate of contacts, and ablations compares rigs
-    and estimators. Each accepts --quick, which takes minutes, and --out DIR, the folder for
-    report.html, results.json and figures. If a run is stopped, the same command resumes it from the
-    cached results of its completed parts.
+    safety, price the throughput that perception leaves at stated rates of contacts, and ablations
+    compares rigs and estimators. Each accepts --quick, which takes minutes, and --out DIR, the
+    folder for report.html, results.json and figures. If a run is stopped, the same command resumes
+    it from the cached results of its completed parts.
     """
 
     experiment: (

@@ -26,19 +26,20 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import require
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms, Velocities3
 from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.enclosure import (
     CAPSULES,
+    BodyCapsules,
     enclose,
     find_shares,
     find_velocities,
     load_enclosure,
 )
 from hrc_env.geometry.robot_model import RobotModel
-from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.config import ShieldConfig, ShieldParams
 from hrc_env.safety.constraints import (
     ABSENT_M,
     MAX_CONSTRAINTS,
@@ -54,7 +55,7 @@ from hrc_env.safety.contact import (
     make_contact_limits,
     permitted_contact_speed,
 )
-from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, find_support
+from hrc_env.safety.error_bounds import NOT_CALIBRATED, ErrorBounds, Support, find_support
 from hrc_env.safety.reachability import (
     STANDSTILL_M_S,
     Sweep,
@@ -96,8 +97,21 @@ class ArmPose:
     """Index of the link that carries each capsule (K,)."""
 
 
+class KnownBodies(NamedTuple):
+    """Bodies whose surfaces are known instead of estimated, for upper bounds on performance."""
+
+    capsules: BodyCapsules
+    """Capsules of the bodies (B, W, S, ...)."""
+    velocity_world: Velocities3
+    """Velocities of the ends of the capsules (B, W, S, 2, 3) [m/s]."""
+
+
 def limit_command(
-    belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
+    belief: Belief,
+    velocities: JointVelocities,
+    dt_s: float,
+    config: ShieldConfig,
+    known: KnownBodies | None = None,
 ) -> ShieldOutput:
     """Return the safe joint velocities nearest to the given ones; implements `shield.Shield`.
 
@@ -112,14 +126,15 @@ def limit_command(
         velocities: (B, N) joint velocities of the agent [rad/s].
         dt_s: time until the next command [s].
         config: kind, margins and limits.
+        known: bodies to use instead of the estimated ones; None without such knowledge.
 
     Raises:
         ConfigError: the belief lacks the `RobotModel` or the current command.
     """
     if config.kind == "sara":
-        return execute_verified(belief, velocities, dt_s, config)
+        return execute_verified(belief, velocities, dt_s, config, known)
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
-    found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
+    found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config, known)
     limit = partial(limit_speed, pose.frames, pose.model.chain.slides, pose.links,
                     belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
     wanted, allowed, slack = velocities.copy(), np.empty_like(velocities), np.empty(len(velocities))
@@ -138,7 +153,11 @@ def limit_command(
 
 
 def execute_verified(
-    belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
+    belief: Belief,
+    velocities: JointVelocities,
+    dt_s: float,
+    config: ShieldConfig,
+    known: KnownBodies | None = None,
 ) -> ShieldOutput:
     """Return the given joint velocities where they are verified; the other robots brake.
 
@@ -147,8 +166,7 @@ def execute_verified(
     """
     pose, undetected = describe_pose(belief), find_undetected(belief, config)
     model, command = pose.model, require(belief.command, "The current command of the joints")
-    params = config.make_params()
-    bodies = describe_bodies(belief, pose, undetected.is_lost, config, params.bounds)
+    params, bodies = _select_bodies(belief, pose, undetected.is_lost, config, known)
     limit = partial(limit_speed, pose.frames, model.chain.slides, pose.links,
                     belief.robot.capsules_world, undetected.speed_limit_m_s)  # fmt: skip
     hold_s, change = max(config.reaction_s, dt_s), model.slew_rad_s2 * dt_s
@@ -210,6 +228,7 @@ def build_constraints(
     wanted: JointVelocities,
     dt_s: float,
     config: ShieldConfig,
+    known: KnownBodies | None = None,
 ) -> Constraints:
     """Return the tightest constraints on the joint velocities of every robot.
 
@@ -223,6 +242,7 @@ def build_constraints(
         wanted: (B, N) joint velocities of the agent [rad/s].
         dt_s: time until the next command [s].
         config: kind, margins and limits.
+        known: bodies to use instead of the estimated ones, as in `limit_command`.
     """
     model, batch = pose.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
@@ -253,8 +273,8 @@ def build_constraints(
         inverse_mass=model.invert_mass_matrices(pose.frames, weigh_loads(belief, model)),
         obstacles=model.obstacles,
     )
-    params, floor = config.make_params(), belief.unseen
-    bodies = describe_bodies(belief, pose, is_lost, config, params.bounds)
+    params, bodies = _select_bodies(belief, pose, is_lost, config, known)
+    floor = belief.unseen
     add_worker_constraints(robots, bodies, params, found)
     if floor is not None and np.isfinite(floor.possible_m).any():
         walked_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
@@ -304,6 +324,32 @@ def describe_bodies(
         shares=find_shares(),
         support=support,
     )
+
+
+def _select_bodies(
+    belief: Belief,
+    pose: ArmPose,
+    is_lost: Bools,
+    config: ShieldConfig,
+    known: KnownBodies | None,
+) -> tuple[ShieldParams, Bodies]:
+    """Return the settings and the bodies to use: the estimated ones, or the known ones.
+
+    The surfaces of known bodies have no errors; only `min_uncertainty_m` remains.
+    """
+    params = config.make_params()
+    bodies = describe_bodies(belief, pose, is_lost, config, params.bounds)
+    if known is None:
+        return params, bodies
+    age_class = np.full_like(bodies.support.age_class, NOT_CALIBRATED)
+    bodies = bodies._replace(
+        segments=known.capsules.ends_world,
+        radii_m=known.capsules.radius_m,
+        velocity=known.velocity_world,
+        cov=np.zeros_like(bodies.cov),
+        support=Support(bodies.support.factor, age_class),
+    )
+    return params._replace(protrusion_m=np.zeros_like(params.protrusion_m)), bodies
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,8 @@ from hrc_env.experiments.site import experiment as site
     (lab.QUICK, "2 seeds of 4 s: too few"),
     (site.QUICK, "2 seeds of 6 s: too few"),
     (ablations.QUICK, "4 seeds of 5 s: too few"),
-    (price.make_experiment(quick=True), "900 seeds of 10 s: 600 of them count, not 1000"),
-    (price.make_experiment(quick=True, seeds=12), "12 seeds of 10 s: too few"),
+    (price.make_experiment(quick=True), "16 seeds of 10 s: too few"),
+    (price.make_experiment(quick=True, seeds=12), "24 seeds of 10 s: too few"),
     (impact.make_experiment(quick=True), "8 seeds of 4 s: too few"),
     (impact.make_experiment(quick=True, seeds=90), "90 seeds of 4 s: too few"),
 ])  # fmt: skip

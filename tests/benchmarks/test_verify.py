@@ -227,7 +227,7 @@ def test_arguments_that_cannot_work_are_refused_in_words(given, words):
 
 def test_rows_are_those_of_the_tables():
     assert find_row("site", "one_camera.3") == "one_camera"
-    assert find_row("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
+    assert find_row("price", "one_camera.fast.proof.19000500") == "one_camera.fast"
     assert find_row("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
     recorded = {find_row("kept", label) for label in records.read("kept").parts}
     assert len(recorded) == len(records.read("kept").parts)

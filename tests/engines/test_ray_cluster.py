@@ -363,7 +363,12 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
         Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", REFERENCE)),
         Site(n_seeds=1, seconds=1.5, n_closed=1, estimators=("particle",)),
         Price(
-            setups=("truth", "particle"), n_seeds=2, n_fresh=2, n_search=1, n_pixels=0, n_steps=8
+            setups=("truth", "four_cameras"),
+            n_settings=2,
+            n_choosing=2,
+            n_kept=1,
+            n_proof=2,
+            n_steps=8,
         ),
     ],
     ids=["impact", "site", "price"],

@@ -7,7 +7,7 @@ from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS
 from hrc_env.experiments import columns
 from hrc_env.experiments.impact.metrics import AN_EPISODE
 from hrc_env.experiments.price.episodes import CONTACTS
-from hrc_env.experiments.price.metrics import _measure_rates
+from hrc_env.experiments.price.metrics import _measure
 
 EPISODES = [{**dict.fromkeys(STATISTICS, 1.0), "seconds": 10.0} for _ in range(4)]
 
@@ -30,4 +30,4 @@ def test_evaluations_and_experiments_say_it_too():
     assert set(AN_EPISODE.values()) == {"control steps per episode"}
     ones = dict.fromkeys(("achieved", "cost", "minutes", *columns.STATISTICS), np.ones(3))
     kinds = dict.fromkeys(CONTACTS, np.ones(3))
-    assert _measure_rates({**ones, **kinds})["cost"].unit == "control steps per episode of 10 s"
+    assert _measure({**ones, **kinds})["cost"].unit == "control steps per episode of 10 s"

@@ -29,8 +29,7 @@ from hrc_env.experiments.setups import REFERENCE, PerceptionSetup
 from hrc_env.experiments.study import Row, Study
 
 ROOT = Path(__file__).resolve().parents[2]
-SAFETY = ("impact", "kept", "shielded", "limited", "price", "frontier",
-          "under_shield")  # fmt: skip
+SAFETY = ("impact", "kept", "shielded", "limited", "price", "under_shield")
 """Commands of the safety studies."""
 ZERO = re.compile(r"[+-]?0(\.0+)?( ●)?")
 WIDTHLESS = re.compile(r"[+-]?0(?:\.0+)? \([+-]?0(?:\.0+)? to [+-]?0(?:\.0+)?\)")

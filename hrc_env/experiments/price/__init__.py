@@ -1,4 +1,5 @@
-"""The price study: the cost of perception at an equal rate of contacts.
+"""The price study: the throughput that sight leaves at stated rates of contacts.
 
-The margin of each perception setup is chosen so that the setup reaches that rate.
+For each perception setup, settings of the shield are compared on choosing seeds, and the best are
+played again on other seeds, the proof seeds.
 """

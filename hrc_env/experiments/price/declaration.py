@@ -1,181 +1,165 @@
 """The declaration of the price study: question, columns and tables."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.price.metrics import PER
-from hrc_env.experiments.price.setups import ELSEWHERE, FOUR, ONE, TRUTH, PriceSetup, list_setups
-from hrc_env.experiments.price.shield import SHIELD
+from hrc_env.experiments.price.halving import Status
+from hrc_env.experiments.price.metrics import CHOOSING, CONTRASTS, NO_SETTING, name_level
+from hrc_env.experiments.price.settings import list_settings
+from hrc_env.experiments.price.setups import PriceSetup, list_setups
 from hrc_env.experiments.report import Table
 
-TITLE = "Cost of perception at one rate of contacts"
+TITLE = "The price of sight"
 QUESTION = """\
-How much throughput does a perception setup leave at one rate of contacts? Every setup gets the
-shield margin with which the robot touches a worker while moving towards them {hourly:.1f} times an
-hour ({level:g} times in 1,000 episodes of 10 s); the remaining goals are compared. The
-margin is added to all protective distances of the `{shield}` shield (`margin_m` and
-`hand_margin_m` of `ShieldConfig`) and may be negative, as the shield with its defaults is much
-safer than that. It is found by bisection on {n_seeds} episodes, the same for all setups, and
-confirmed on {n_fresh} others: the intervals contain the uncertainty of both the level and the
-margin. Workers ignore {robot}; a contact is named by the robot's motion in the step before, and
-touches within half a second of each other are one. Tasks with longer episodes have fewer of them;
-a thousand episodes always stand for the same time.
+How much throughput does a perception setup leave if the robot may touch a worker at most {levels}
+times an hour while moving towards them? The levels were stated beforehand. For each setup,
+{n_settings} settings of the shield are compared: without a shield, and with other margins, limits
+near the unknown, and responses to doubtful estimates. {n_kept} of them are kept after {n_choosing}
+episodes each and played for {n_proof} episodes on other seeds (`hrc_env.experiments.price.halving`
+states the rules). The intervals of contacts are exact. A level is *met* if the upper end of the
+interval does not exceed it, and *estimated* if only the estimate does not. Nothing is extrapolated:
+if no setting is below a level, there is no number.
 
-This is one level and one shield, and detections are emulated. The rates of other contacts and the
-severity of contacts are not equalized. With true joints the shield still has its own model of the
-body around them. At a stricter level, or with another shield, the order may differ."""
-_ROW, _FRESH = "{0}.{1}.", "confirmed."
-"""Prefixes of metrics: task and perception setup, and statistics of the confirming episodes."""
-PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "tested margin [m]", 4, plain=True)
-PER_HOUR = 60.0 / PER
-"""Factor from contacts in 1,000 episodes of 10 s to contacts per hour."""
-TOWARDS = Column(
-    f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [1/h]", 1, PER_HOUR, counted=True
-)
-SEVERE = Column(
-    f"{_ROW}{_FRESH}above_force_limit",
-    "contacts above the force limit at tested margin [%]",
-    0,
-    100,
-    counted=True,
-    shows="value of n",
-)
-LEFT = (
-    Column(_ROW + "margin_m", "margin [m]", 3),
-    Column(_ROW + "goals_per_min", "goals [1/min]"),
-    Column(_ROW + "share", "throughput [% of unshielded]", 0, 100),
-    Column(_ROW + "of_truth", "throughput [% of true joints]", 0, 100),
-)
-"""Columns of the metrics at the common rate of contacts."""
-COLUMNS = (*LEFT, PLAYED, TOWARDS, SEVERE)
-"""Columns of the tables in the documentation and in the report."""
-MORE = (
-    Column(f"{_ROW}{_FRESH}standing", "standing [1/h]", 1, PER_HOUR, counted=True),
-    Column(f"{_ROW}{_FRESH}away", "fleeing [1/h]", 1, PER_HOUR, counted=True),
-    Column(f"{_ROW}{_FRESH}contacts", "contacts [1/h]", 1, PER_HOUR, counted=True),
-    Column(f"{_ROW}{_FRESH}interventions", "interventions [1/h]", 0, counted=True),
-    Column(f"{_ROW}{_FRESH}goals_per_min", "goals at tested margin [1/min]"),
-    Column(f"{_ROW}{_FRESH}cost", "true cost at tested margin"),
-)
-"""Further columns of the tables in the report."""
-CONTRAST_LABELS = {
-    "three_cameras": "the fourth camera", "two_cameras": "the third and the fourth camera",
-    "one_camera": "the second to the fourth camera",
-    "late_120ms": "images on time instead of 120 ms late, time-stamped",
-    "late_200ms": "images on time instead of 200 ms late, time-stamped",
-    "telling_120ms": "time stamps of images 120 ms late",
-    "telling_200ms": "time stamps of images 200 ms late", "kalman": "particle instead of kalman",
-    "paper_restarts": "particle instead of paper_restarts",
-    "triangulation": "particle instead of triangulation",
-    "calibration": "correct calibration instead of all cameras turned by 1 degree",
-    "half_covariance": "covariances as estimated instead of halved",
-    "twice_covariance": "covariances as estimated instead of doubled",
-    "honesty_of_one": "with one camera: covariances as estimated instead of halved",
-    "truth": "true joints instead of four cameras",
-    "calibration_over_accuracy": "correct calibration over a better estimator "
-    "(triangulation minus cameras turned by 1 degree)",
+Workers ignore {robot}. A contact is named by the robot's motion in the step before, and touches
+within half a second of each other are one. Detections are emulated. Throughput is relative to an
+unshielded robot with true joints on the same seeds, so that with few cameras it also contains what
+perception costs without a shield. The settings are those that were tried: others may be better."""
+STATUS_WORDS = {
+    Status.SHOWN: "met", Status.ESTIMATED: "estimated", Status.MISSED: "not met",
 }  # fmt: skip
-"""Labels of `CONTRASTS`."""
-WORTH = Table(
-    "worth",
-    "Gain in throughput",
-    {question: (label,) for question, label in CONTRAST_LABELS.items()},
-    (Column("worth.{}", "gain [%]", 1, 100.0, signed=True),),
-    ("improvement",),
-    "Throughput gained by the improvement at the same rate of contacts, in percentage points of "
-    "the throughput of an unshielded robot, on the same seeds. Intervals are those of single rows.",
+"""Words in tables for whether a level is met."""
+
+
+def _list_columns(prefix: str) -> tuple[Column, ...]:
+    """Return the columns of contacts of the rows with a prefix of their metrics."""
+    return (
+        Column(f"{prefix}towards", "contacts towards [1/h]", 2, counted=True),
+        Column(f"{prefix}contacts", "contacts of all kinds [1/h]", 1, counted=True),
+        Column(f"{prefix}severe", "contacts above the force limit [1/h]", 2, counted=True),
+    )
+
+
+def _list_proof_columns(prefix: str) -> tuple[Column, ...]:
+    """Return the columns of rows on the proof seeds."""
+    return (
+        Column(f"{prefix}share", "throughput [% of unshielded]", 1, 100),
+        Column(f"{prefix}goals_per_min", "goals [1/min]"),
+        *_list_columns(prefix),
+        Column(
+            f"{prefix}above_force_limit", "of all contacts [%]", 0, 100, counted=True,
+            shows="value of n",
+        ),
+    )  # fmt: skip
+
+
+MORE = (
+    Column("{0}.{1}.standing", "standing [1/h]", 2, counted=True),
+    Column("{0}.{1}.away", "fleeing [1/h]", 2, counted=True),
+    Column("{0}.{1}.interventions", "interventions [1/h]", 0, counted=True),
+    Column("{0}.{1}.cost", "cost"),
 )
+"""Further columns of the table of all kept settings in the report."""
 
 
-def count_per_hour(level: float) -> float:
-    """Convert a number of contacts in 1,000 episodes of 10 s to contacts per hour."""
-    return PER_HOUR * level
-
-
-def make_price_table(
-    task: str,
-    setups: Sequence[PriceSetup],
-    robot: str,
-    n_seeds: int,
-    level: float,
-    more: Sequence[Column] = (),
-) -> Table:
-    """Return the table of all perception setups in one task.
+def make_best_table(setups: Sequence[PriceSetup], levels_per_hour: Sequence[float]) -> Table:
+    """Return the table of the best setting of each perception setup at each level.
 
     Args:
-        task: id of the environment.
-        setups: setups in the order of the rows.
-        robot: description of the robot, such as "the scripted robot".
-        n_seeds: number of episodes per search step.
-        level: contacts in 1,000 episodes of 10 s at which setups are compared.
-        more: columns in addition to those of the documentation.
+        setups: perception setups in the order of the rows.
+        levels_per_hour: levels of the rate of contacts [1/h].
     """
+    rows: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for level_per_hour in levels_per_hour:
+        for setup in setups:
+            words = {name: each.words for name, each in list_settings(setup.family).items()}
+            key, cells = (name_level(level_per_hour), setup.name), (f"{level_per_hour:g}",)
+            for setting, said in words.items():
+                for status in (Status.SHOWN, Status.ESTIMATED):
+                    row = (*cells, setup.words, said, STATUS_WORDS[status])
+                    rows[*key, setting, status.value] = row
+            missed = (*cells, setup.words, "-", STATUS_WORDS[Status.MISSED])
+            rows[*key, NO_SETTING, Status.MISSED.value] = missed
     return Table(
         "price",
-        f"Cost of perception at {count_per_hour(level):.1f} contacts towards per hour",
-        {(task, each.name): (each.words,) for each in setups},
-        (*COLUMNS, *more),
-        ("perception",),
-        f"Goals that {robot} reaches beside unaware workers, with emulated detections and "
-        f"the `{SHIELD}` shield. Each setup has the margin with which the robot touches a worker "
-        f"while moving towards them {count_per_hour(level):.1f} times per hour; other contacts "
-        "and the severity of contacts are not equalized. Above the force limit: share of all "
-        "contacts, by the estimated force and the limit of the touched body region. "
-        "The margin is added to all protective distances; 0 is the default shield, and negative "
-        f"margins let the robot come closer. It is found on {n_seeds} episodes and corrected by "
-        f"{{n[{task}.{setups[0].name}.margin_m]}} others, which are played with the tested margin. "
-        "True joints: the shield knows the joints and has its own model of the body around them.",
+        "Throughput at stated rates of contacts",
+        rows,
+        _list_proof_columns("{0}.{1}.{2}.{3}."),
+        ("at most [1/h]", "perception", "shield", "level"),
+        "The best of twelve settings of the `qp` shield for each perception setup, among them the "
+        "unshielded robot. Level: met if the upper end of the exact interval of contacts towards "
+        "does not exceed it, estimated if only the estimate does not. Throughput: goals relative "
+        "to an unshielded robot with true joints on the same seeds. The contacts above the force "
+        "limit of the touched region are given per hour and as a share of all contacts. True "
+        "capsules: the shield receives the workers' true surfaces, which no sensor provides. True "
+        "joints: the body around the joints is estimated.",
     )
 
 
-def make_small_price_table(task: str) -> Table:
-    """Return the table of an additional task, in which few setups are compared."""
-    rows = {(task, name): (list_setups()[name].words,) for name in ELSEWHERE}
-    return Table("price_in", task, rows, (*LEFT, TOWARDS, SEVERE), ("perception",))
+def make_frontier_table(setups: Sequence[PriceSetup]) -> Table:
+    """Return the table of all settings that were played on the proof seeds.
 
-
-def make_tasks_table(tasks: Sequence[str]) -> Table:
-    """Return the table of all tasks, with one row per task."""
-    words = {TRUTH: "true joints", FOUR: "four cameras", ONE: "one camera"}
-    shares = [Column(f"{{}}.{name}.share", f"{words[name]} [%]", 0, 100) for name in ELSEWHERE]
+    Args:
+        setups: perception setups in the order of the rows.
+    """
+    rows = {
+        (setup.name, name): (setup.words, each.words)
+        for setup in setups
+        for name, each in list_settings(setup.family).items()
+    }
     return Table(
-        "price_elsewhere",
-        "Cost of perception in all tasks",
-        {task: (f"`{task}`",) for task in tasks},
-        (*shares, Column("{}.ranking", "ranking holds [%]", 0, 100, plain=True)),
-        ("task",),
-        "Throughput as a share of that of an unshielded robot with true joints, at the same rate "
-        "of contacts or, where that rate is not reached, at the lowest margin that was tried. "
-        "Rows that do not reach the rate have fewer contacts; there the shield's speed limit near "
-        "unseen areas, which does not depend on the margin, slows the robot with one camera. "
-        "Ranking: share of bootstrap samples in which true joints give at least the throughput of "
-        "four cameras, and four cameras at least that of one.",
+        "price_frontier", "Settings on the proof seeds", rows,
+        (*_list_proof_columns("{0}.{1}."), *MORE), ("perception", "shield"),
+    )  # fmt: skip
+
+
+def make_choosing_table(setups: Sequence[PriceSetup]) -> Table:
+    """Return the table of all settings on the choosing seeds.
+
+    Args:
+        setups: perception setups in the order of the rows.
+    """
+    rows = {
+        (setup.name, name): (setup.words, each.words)
+        for setup in setups
+        for name, each in list_settings(setup.family).items()
+    }
+    prefix = CHOOSING + "{0}.{1}."
+    goals = Column(f"{prefix}goals_per_min", "goals [1/min]")
+    columns = (goals, *_list_columns(prefix))
+    return Table(
+        "price_choosing", "Settings on the choosing seeds", rows, columns, ("perception", "shield"),
+        "From these numbers the settings were chosen; they prove nothing.",
+    )  # fmt: skip
+
+
+def make_worth_table(levels_per_hour: Sequence[float]) -> Table:
+    """Return the table of all contrasts between perception setups.
+
+    Args:
+        levels_per_hour: levels of the rate of contacts [1/h].
+    """
+    words = {name: each.words for name, each in list_setups().items()}
+    rows: dict[tuple[str, ...], tuple[str, ...]] = {
+        (name_level(level), name): (
+            f"{level:g}", f"{words[pair.better]} instead of {words[pair.worse]}"
+        )
+        for level in levels_per_hour
+        for name, pair in CONTRASTS.items()
+    }  # fmt: skip
+    return Table(
+        "worth",
+        "Gain in throughput at stated rates of contacts",
+        rows,
+        (Column("worth.{0}.{1}", "gain [%]", 1, 100.0, signed=True),),
+        ("at most [1/h]", "improvement"),
+        "Difference between the throughputs of the best settings, in percentage points, on the "
+        "same seeds. Contrasts without a setting at the level are left out. Where a level is "
+        "only estimated, the two robots may touch workers at different rates. Intervals are those "
+        "of single rows.",
     )
 
 
-def _make_rate_columns(prefix: str) -> list[Column]:
-    """Return the columns of the confirming episodes for metrics with another prefix."""
-    return [
-        replace(
-            column,
-            metric=prefix + column.metric.removeprefix(_ROW + _FRESH),
-            heading=column.heading.replace(" at tested margin", ""),
-        )
-        for column in (TOWARDS, SEVERE, *MORE)
-    ]
-
-
-def make_unshielded_table(task: str) -> Table:
-    """Return the table of the robot without a shield."""
-    columns = _make_rate_columns("{}.unshielded.")
-    return Table("price_unshielded", "Without a shield", {task: ("no shield",)}, columns)
-
-
-IMAGES = Table(
-    "price_images",
-    "Emulator and rendered images",
-    {"keypoints": ("the emulator",), "pixels": ("rendered images and the network",)},
-    _make_rate_columns("slice.{}."),
-    ("level",),
-)
+def make_unshielded_table() -> Table:
+    """Return the table of the unshielded robot with true joints on the proof seeds."""
+    columns = (Column("unshielded.goals_per_min", "goals [1/min]"), *_list_columns("unshielded."))
+    return Table("price_unshielded", "Without a shield", {"": ("no shield",)}, columns)

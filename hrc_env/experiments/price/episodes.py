@@ -1,4 +1,4 @@
-"""Episodes of a robot with a shield and one perception setup, and their outcomes.
+"""Episodes of a robot with one perception setup and one setting of the shield, and their outcomes.
 
 As in `experiments.impact`, all setups have the same seeds and the same workers, which ignore the
 robot. `safety.incidents` defines contacts.
@@ -22,9 +22,10 @@ from hrc_env.evaluation.sums import ABOVE, ACTIVE, FORCE, INTERVENTIONS, RATED, 
 from hrc_env.experiments.agents import describe_agent
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.price.setups import PriceSetup
-from hrc_env.experiments.price.shield import Widened
+from hrc_env.experiments.price.true_bodies import TrueBodyShield
 from hrc_env.experiments.stage import EndlessEpisodes, Rows, Stage
 from hrc_env.motion import generator
+from hrc_env.safety.config import ShieldConfig
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import find_task
 from hrc_env.vector.shards import Shards
@@ -83,64 +84,45 @@ class Driver:
         return make_agent(self.agent, env_info(part), trust=self.trust)
 
 
-class EpisodeRunner:
-    """Environments that play the episodes of a task with one perception setup."""
-
-    def __init__(
-        self,
-        setup: PriceSetup,
-        task: str,
-        n_steps: int,
-        is_shielded: bool = True,
-        driver: Driver = Driver(),
-    ) -> None:
-        self.setup, self.task, self.n_steps, self.driver = setup, task, n_steps, driver
-        self.is_shielded, self._shield = is_shielded, Widened(setup.covariance)
-        shield = self._shield if is_shielded else None
-        arguments = {"task": task, "shield": shield, **driver.env_arguments}
-        self._stage = Stage(setup.perception, setup.turns(find_task(task).scene), arguments)
-
-    def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
-        """Play episodes with `margin_m` added to the shield's distances; return their sums."""
-        self._shield.margin_m = margin_m
-        play = partial(run, n_steps=self.n_steps, driver=self.driver)
-        return self._stage.play(seeds, play, tick)
-
-    def close(self) -> None:
-        """Release threads and graphics contexts."""
-        self._stage.close()
-
-
 def play_episodes(
     setup: PriceSetup,
+    shield: ShieldConfig | None,
     task: str,
     n_steps: int,
-    is_shielded: bool,
     driver: Driver,
     seeds: Sequence[int],
-    margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Play episodes as `EpisodeRunner.play` does, in environments that are made for this call.
+    """Play one episode per seed and return the sums of the episodes.
 
     Args:
         setup: the perception setup.
+        shield: settings of the shield; None without a shield.
         task: id of the environment.
         n_steps: length of an episode [control steps].
-        is_shielded: whether there is a shield.
         driver: the agent.
         seeds: seeds of the episodes.
-        margin_m: margin added to the shield's distances [m].
         tick: callback that receives the increase of the completed fraction.
     """
-    with closing(EpisodeRunner(setup, task, n_steps, is_shielded, driver)) as runner:
-        return runner.play(seeds, margin_m, tick)
+    arguments = {"task": task, "shield": shield, **driver.env_arguments}
+    stage = Stage(setup.perception, setup.turns(find_task(task).scene), arguments)
+    with closing(stage):
+        return stage.play(seeds, partial(run, setup, shield, n_steps, driver), tick)
 
 
 def run(
-    env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int, driver: Driver
+    setup: PriceSetup,
+    shield: ShieldConfig | None,
+    n_steps: int,
+    driver: Driver,
+    env: Shards,
+    seeds: Sequence[int],
+    tick: PartProgress,
 ) -> Rows:
-    """Play one episode per seed as one batch and return the sums of the episodes."""
+    """Play one episode per seed as one batch; arguments as in `play_episodes`."""
+    if setup.knows_bodies and shield is not None:
+        for part in env.parts:
+            part.shield = TrueBodyShield(part, shield)
     agent, endless, task = driver.make(env.first), EndlessEpisodes(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
     keys = {**CONTACTS, "achieved": task.achieved}

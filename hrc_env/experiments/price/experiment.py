@@ -1,12 +1,11 @@
-"""The price study: a search for margins that give all setups the same rate of contacts."""
+"""The price study: settings of the shield by successive halving, for each perception setup."""
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
@@ -14,22 +13,19 @@ from hrc_env.core.results import Metric
 from hrc_env.engines.files import carried
 from hrc_env.experiments.agents import check_choice
 from hrc_env.experiments.cache import Part, PartCache
-from hrc_env.experiments.columns import Column
 from hrc_env.experiments.price import declaration
 from hrc_env.experiments.price.episodes import SCRIPTED, Driver, play_episodes
-from hrc_env.experiments.price.metrics import PER, Played, Row, compute_metrics, suppose_margin_m
+from hrc_env.experiments.price.halving import keep_settings
+from hrc_env.experiments.price.metrics import Played, compute_metrics, tally
 from hrc_env.experiments.price.report import make_report
-from hrc_env.experiments.price.search import run_together, search
+from hrc_env.experiments.price.settings import UNSHIELDED, Setting, list_settings
 from hrc_env.experiments.price.setups import (
-    ELSEWHERE,
-    FOUR,
     QUICK,
     TRUTH,
     PriceSetup,
     find_setups,
     list_default_setups,
 )
-from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import (
     SHIELD_CHOSEN_ON,
     Conditions,
@@ -43,25 +39,16 @@ from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import check_at_least_one, override
 from hrc_env.experiments.stage import PEOPLE, WORKER, Rows
 from hrc_env.experiments.versions import hash_source, make_key
-from hrc_env.tasks import BUILT_IN, DEFAULT
+from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, find_task
 from hrc_env.tracking.estimators import find_estimator
 
-QUICK_FRESH = 600
-"""Number of new episodes that confirm a margin in the quick form."""
-FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
-"""First seeds of the search, of the episodes that confirm its margin, and of those with rendered
-images."""
-BEYOND_M = (0.05, 0.1, 0.2)
-"""Distances by which a search successively extends its range if the outermost margins do not
-suffice [m]."""
-
-
-class Case(NamedTuple):
-    """A task and the perception setup with which it is played."""
-
-    task: str
-    setup: PriceSetup
+CHOOSING_SEED, PROOF_SEED = 18_000_000, 19_000_000
+"""First seeds of the episodes on which settings are chosen, and of those that prove them."""
+QUICK_SEEDS = 18_900_000, 19_900_000
+"""The same for the quick form, so that a preview does not use any seed of the whole study."""
+CHOOSING, PROOF, REFERENCE = "choosing", "proof", "reference"
+"""Names of roles of episodes in the labels of parts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,25 +60,27 @@ class Price:
     """
 
     name = "price"
-    depends = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
+    depends = ("env", "tracker", "emulator", "motion", "shield", "agents")
     task: str = DEFAULT
     """Id of the environment."""
-    others: tuple[str, ...] = ()
-    """Other tasks, which are played with the setups `ELSEWHERE`."""
     setups: tuple[str, ...] = field(default_factory=list_default_setups)
     """Names of the perception setups."""
-    n_seeds: int = 300
-    """Number of episodes per search step."""
-    n_fresh: int = 1000
-    """Number of episodes on new seeds that confirm the margin of the search."""
-    n_search: int = 4
-    """Number of bisections in a search. Margins on either side are tried afterwards."""
-    bracket_m: tuple[float, float] = (-0.4, 0.4)
-    """Lowest and highest margin in the initial bracket of a search [m]."""
-    level: float = 30.0
-    """Contacts towards the worker in 1,000 episodes of 10 s at which setups are compared."""
-    n_pixels: int = 40
-    """Number of episodes that are played both with rendered images and with the emulator."""
+    levels_per_hour: tuple[float, ...] = (1.0, 10.0)
+    """Levels of the rate of contacts towards the worker [1/h]."""
+    n_settings: int = 12
+    """Number of settings of the shield for each setup, the first of `list_settings`."""
+    n_choosing: int = 500
+    """Number of episodes of each setting on the choosing seeds."""
+    n_kept: int = 3
+    """Number of settings of each setup that are played on the proof seeds."""
+    n_proof: int = 4000
+    """Number of episodes of each of them on the proof seeds."""
+    choosing_seed: int = CHOOSING_SEED
+    """First choosing seed."""
+    proof_seed: int = PROOF_SEED
+    """First proof seed."""
+    n_together: int = 500
+    """Maximum number of episodes in a part, a multiple of the numbers of camera choices (4)."""
     n_steps: int | None = None
     """Number of control steps of an episode; None: the time limit of the task."""
     driver: Driver = field(default_factory=Driver)
@@ -99,142 +88,200 @@ class Price:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""
-        check_at_least_one(self, "n_seeds", "n_fresh", "n_search")
+        numbers = ("n_settings", "n_choosing", "n_kept", "n_proof", "n_together")
+        check_at_least_one(self, *numbers)
         find_setups(self.setups)
         if not self.setups:
             raise ConfigError(
                 f"No perception setup to compare; valid are {', '.join(list_default_setups())}."
             )
-        low, high = self.bracket_m
-        if not (low < high and self.level > 0):
+        levels = self.levels_per_hour
+        if not levels or min(levels) <= 0 or len(set(levels)) < len(levels):
             raise ConfigError(
-                "bracket_m must be (least, greatest) and level must be positive, "
-                f"got {self.bracket_m} and {self.level}."
+                f"levels_per_hour must be different positive rates, got {self.levels_per_hour}."
+            )
+        if self.n_together % 4:
+            raise ConfigError(f"n_together must be a multiple of 4, got {self.n_together}.")
+        both = set(self.choosing_seeds) & set(self.proof_seeds)
+        if both:
+            raise ConfigError(
+                "Choosing seeds and proof seeds must differ, as data on which a choice was made "
+                f"cannot prove it; {len(both)} seeds are both, such as {min(both)}."
             )
         check_choice(self.driver.agent)
-        for task in self.tasks:
-            _check_task(task, self.driver.agent)
+        _check_task(self.task, self.driver.agent)
 
     @property
-    def tasks(self) -> tuple[str, ...]:
-        """All tasks, of which the first is played with all setups."""
-        return (self.task, *self.others)
+    def choosing_seeds(self) -> list[int]:
+        """Seeds of the episodes on which settings are chosen."""
+        return self._list_seeds(self.choosing_seed, self.n_choosing)
 
-    def list_cases(self) -> Iterator[Case]:
-        """Yield every task with every perception setup."""
-        for name in self.tasks:
-            for setup in find_setups(self.setups if name == self.task else ELSEWHERE):
-                yield Case(name, setup)
-
-    def count_steps(self, task: str) -> int:
-        """Return the number of control steps of an episode of a task."""
-        return self.n_steps or find_task(task).max_episode_steps
+    @property
+    def proof_seeds(self) -> list[int]:
+        """Seeds of the episodes that prove the chosen settings."""
+        return self._list_seeds(self.proof_seed, self.n_proof)
 
     @property
     def seeds(self) -> list[int]:
-        """Seeds of the search and of the episodes that confirm its margin."""
-        fresh = self.list_seeds(self.task, self.n_fresh, FIRST_FRESH)
-        return self.list_seeds(self.task, self.n_seeds) + fresh
+        """All seeds."""
+        return self.choosing_seeds + self.proof_seeds
 
-    def list_seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
-        """Return the seeds of a task, one per episode.
+    def _list_seeds(self, first: int, n: int) -> list[int]:
+        """Return the seeds of episodes that take as long as `n` episodes of the default task."""
+        share = find_task(DEFAULT).max_episode_steps / find_task(self.task).max_episode_steps
+        return list(range(first, first + max(round(n * share), 1)))
 
-        The episodes take as long as `n` episodes of the default task.
-        """
-        share = find_task(DEFAULT).max_episode_steps / find_task(task).max_episode_steps
-        return [first + k for k in range(max(round(n * share), 1))]
+    def list_settings(self, setup: PriceSetup) -> dict[str, Setting]:
+        """Return the settings of the shield that are compared for a perception setup, by name."""
+        return dict(islice(list_settings(setup.family).items(), self.n_settings))
+
+    def count_steps(self) -> int:
+        """Return the number of control steps of an episode."""
+        return self.n_steps or find_task(self.task).max_episode_steps
 
     @property
     def n_parts(self) -> int:
-        """Maximum number of parts.
-
-        The parts are search steps, and episodes without a shield or with rendered images.
-        """
-        n_cases = sum(1 for _ in self.list_cases())
-        n_levels = 2 if self.n_pixels and FOUR in self.setups else 0
-        n_each = self.n_search + 4 + len(BEYOND_M)
-        return n_cases * n_each + 1 + len(self.others) + n_levels
+        """Number of parts on the choosing seeds and on the proof seeds."""
+        n_choosing, n_proof = (
+            -(-len(seeds) // self.n_together) for seeds in (self.choosing_seeds, self.proof_seeds)
+        )
+        settings = [len(self.list_settings(setup)) for setup in find_setups(self.setups)]
+        kept = sum(min(n, self.n_kept) for n in settings)
+        return sum(settings) * n_choosing + (kept + 1) * n_proof
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables and figures of a quick run; "" for other runs."""
-        usual, seconds = Price(), self.count_steps(self.task) * DT_S
-        if self.n_seeds < usual.n_seeds or self.n_fresh < QUICK_FRESH:
-            return describe_quick_run(self.n_seeds, seconds)
-        if self.n_fresh >= usual.n_fresh:
+        """The warning on tables and figures of a shorter run; "" for others."""
+        usual = Price()
+        if self.n_proof >= usual.n_proof and self.n_choosing >= usual.n_choosing:
             return ""
-        consequence = (
-            f"{self.n_fresh} of them count, not {usual.n_fresh}, so intervals are wider than "
-            "those of the whole run; no difference is marked"
-        )
-        return describe_quick_run(self.n_seeds + self.n_fresh, seconds, consequence=consequence)
+        return describe_quick_run(self.n_proof, self.count_steps() * DT_S)
 
     def settings(self) -> dict[str, Any]:
         """Return the settings on which all numbers depend."""
         given = {name: each for name, each in asdict(self).items() if name != "driver"}
-        given |= {"people": PEOPLE, "worker": WORKER, "shield": SHIELD}
+        shields = {
+            setup.name: {name: _describe(each) for name, each in self.list_settings(setup).items()}
+            for setup in find_setups(self.setups)
+        }
+        given |= {"people": PEOPLE, "worker": WORKER, "shields": shields}
         return {**given, **self.driver.settings()}
 
     def play(self, cache: PartCache) -> Played:
-        """Run all searches and return their results."""
-        alone = cache.make_parts([_play_unshielded(self, task) for task in self.tasks])
-        unshielded = dict(zip(self.tasks, alone, strict=True))
-        searches = [
-            search_margin(self, task, setup, unshielded[task]) for task, setup in self.list_cases()
+        """Play all settings on the choosing seeds, and the best of them on the proof seeds."""
+        setups = find_setups(self.setups)
+        everything = [(s, each) for s in setups for each in self.list_settings(s).values()]
+        choosing = self._play_rows(cache, CHOOSING, everything)
+        kept = [
+            (setup, self.list_settings(setup)[name])
+            for setup in setups
+            for name in self.keep_settings(choosing[setup.name])
         ]
-        table: dict[str, dict[str, Row]] = {}
-        rows = run_together(searches, cache.make_parts)
-        for (task, setup), row in zip(self.list_cases(), rows, strict=True):
-            table.setdefault(task, {})[setup.name] = row
-        return Played(table, unshielded, _compare_levels(self, cache, table))
+        proof = self._play_rows(cache, PROOF, [self.reference, *kept])
+        (reference,) = proof.pop(REFERENCE).values()
+        return Played(choosing, proof, reference)
+
+    def keep_settings(self, choosing: Mapping[str, Rows]) -> tuple[str, ...]:
+        """Return the names of the settings to play on the proof seeds.
+
+        Args:
+            choosing: sums of the episodes of one setup on the choosing seeds, by setting.
+        """
+        tallies = {name: tally(rows) for name, rows in choosing.items()}
+        proof_hours = len(self.proof_seeds) * self.count_steps() * DT_S / 3600
+        return keep_settings(tallies, self.levels_per_hour, self.n_kept, proof_hours)
+
+    @property
+    def reference(self) -> tuple[PriceSetup, Setting]:
+        """The unshielded robot with true joints, to which throughput is relative."""
+        (truth,) = find_setups([TRUTH])
+        return replace(truth, name=REFERENCE), list_settings(truth.family)[UNSHIELDED]
+
+    def make_parts(self, role: str, setup: PriceSetup, setting: Setting) -> list[Part]:
+        """Return the parts with the episodes of one setting.
+
+        Args:
+            role: `CHOOSING` or `PROOF`, which determines the seeds.
+            setup: the perception setup.
+            setting: the setting of the shield.
+        """
+        seeds = self.choosing_seeds if role == CHOOSING else self.proof_seeds
+        blocks = (seeds[k : k + self.n_together] for k in range(0, len(seeds), self.n_together))
+        return [self._make_part(role, setup, setting, block) for block in blocks]
+
+    def _make_part(
+        self, role: str, setup: PriceSetup, setting: Setting, seeds: Sequence[int]
+    ) -> Part:
+        n_steps, driver = self.count_steps(), self.driver
+        made_of = {
+            "people": PEOPLE, "worker": WORKER, "task": self.task, "seeds": [*seeds],
+            "n_steps": n_steps, "perception": asdict(setup.perception),
+            "knows_bodies": setup.knows_bodies, "shield": _describe(setting),
+            "estimator": hash_source(find_estimator(setup.perception.estimator).make),
+            **driver.settings(),
+        }  # fmt: skip
+        driver = override(driver, agent=carried(driver.agent))
+        make = partial(play_episodes, setup, setting.shield, self.task, n_steps, driver, [*seeds])
+        label = f"{setup.name}.{setting.name}.{role}.{seeds[0]}"
+        return Part(label, make, make_key(made_of, self.depends))
+
+    def _play_rows(
+        self, cache: PartCache, role: str, settings: Iterable[tuple[PriceSetup, Setting]]
+    ) -> dict[str, dict[str, Rows]]:
+        """Return the sums of all episodes of settings, by perception setup and setting."""
+        asked = [(s.name, c.name, self.make_parts(role, s, c)) for s, c in settings]
+        made = iter(cache.make_parts([part for *_, parts in asked for part in parts]))
+        table: dict[str, dict[str, Rows]] = {}
+        for setup, setting, parts in asked:
+            rows = _join([next(made) for _ in parts])
+            table.setdefault(setup, {})[setting] = rows
+        check_walks(self.task, table)
+        return table
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return all metrics by name."""
-        return compute_metrics(played, self.level)
+        return compute_metrics(played, self.levels_per_hour)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
-        others = (declaration.make_tasks_table(self.tasks),) if self.others else ()
-        tables = (declaration.WORTH, *others)
-        conditions = self.conditions
-        return (
-            self.make_price_table(),
-            *(replace(table, conditions=conditions) for table in tables),
+        tables = (
+            declaration.make_best_table(find_setups(self.setups), self.levels_per_hour),
+            declaration.make_worth_table(self.levels_per_hour),
         )
+        return tuple(replace(table, conditions=self.conditions) for table in tables)
 
     @property
     def conditions(self) -> Conditions:
-        """The conditions of the episodes that confirm margins."""
-        scenes = dict.fromkeys(f"`{find_task(task).scene}`" for task in self.tasks)
-        searched = format_seeds(self.list_seeds(self.task, self.n_seeds))
+        """The conditions of the episodes on the proof seeds."""
         return Conditions(
-            people=f"`{PEOPLE}`", scene=" or ".join(scenes),
-            perception="`keypoints`, and `truth` for true joints",
-            seeds=format_seeds(self.list_seeds(self.task, self.n_fresh, FIRST_FRESH)),
-            chosen_on=f"margins were chosen on {searched}; {SHIELD_CHOSEN_ON}",
+            people=f"`{PEOPLE}`", scene=f"`{find_task(self.task).scene}`",
+            perception="`keypoints`, and `truth` for true capsules and joints",
+            seeds=format_seeds(self.proof_seeds),
+            chosen_on=f"settings of the shield were chosen on {format_seeds(self.choosing_seeds)}; "
+            f"{SHIELD_CHOSEN_ON}",
             worker=WORKER,
         )  # fmt: skip
 
     @property
-    def image_conditions(self) -> Conditions:
-        """The conditions of the episodes with rendered images and of those beside them."""
-        seeds = range(FIRST_PIXELS, FIRST_PIXELS + max(self.n_pixels, 1))
-        return replace(self.conditions, perception="in the rows", seeds=format_seeds(seeds))
-
-    def make_price_table(self, more: Sequence[Column] = ()) -> Table:
-        """Return the table of all perception setups.
-
-        Args:
-            more: columns in addition to those of the documentation.
-        """
-        table = declaration.make_price_table(
-            self.task, find_setups(self.setups), self.driver.words, self.n_seeds, self.level, more
+    def choosing_conditions(self) -> Conditions:
+        """The conditions of the episodes on the choosing seeds."""
+        return replace(
+            self.conditions, seeds=format_seeds(self.choosing_seeds), chosen_on=SHIELD_CHOSEN_ON
         )
-        return replace(table, conditions=self.conditions)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Draw the figure and return the report."""
+        """Draw the figures and return the report."""
         return make_report(figures, self, played, metrics)
+
+
+def _describe(setting: Setting) -> dict[str, Any] | None:
+    """Return the shield of a setting as a value for JSON; None without a shield."""
+    return None if setting.shield is None else asdict(setting.shield)
+
+
+def _join(parts: Sequence[Mapping[str, list[Any]]]) -> Rows:
+    """Return the sums of several parts as one."""
+    return {name: [value for part in parts for value in part[name]] for name in parts[0]}
 
 
 def _check_task(task: str, agent: str) -> None:
@@ -258,154 +305,56 @@ def make_experiment(
 ) -> Price:
     """Return the experiment for the options of the command line.
 
-    The quick form has twelve perception setups and one task. A task other than the default is
-    played with the setups `ELSEWHERE` if none are given. If an agent is given, only one task is
-    played.
+    The quick form has four perception setups with four settings each, and seeds of its own, as has
+    every run with another number of seeds.
     """
     if len(robots) > 1:
         raise ConfigError(
             "The study compares perception setups for a single robot, got --robots "
             f"{' '.join(robots)}. Run it separately for each robot, with different folders (--out)."
         )
-    driver = Driver(*robots or (SCRIPTED,), control=control, trust=trust)
-    others = () if robots else tuple(each for each in BUILT_IN if each != DEFAULT)
-    if task != DEFAULT:
-        usual = Price(task=task, setups=ELSEWHERE, n_pixels=0, driver=driver)
-        usual = override(usual, n_fresh=QUICK_FRESH if quick else None)
-    elif quick:
-        usual = Price(setups=QUICK, n_fresh=QUICK_FRESH, n_pixels=0, driver=driver)
-    else:
-        usual = Price(others=others, driver=driver)
-    config = override(usual, n_seeds=seeds, setups=tuple(dict.fromkeys(setups)) or None)
+    usual = Price(task=task, driver=Driver(*robots or (SCRIPTED,), control=control, trust=trust))
+    if quick:
+        usual = override(usual, setups=QUICK, n_settings=4, n_choosing=8, n_kept=2, n_proof=16)
+    config = override(usual, setups=tuple(dict.fromkeys(setups)) or None)
     if seeds is not None:
-        config = override(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
+        config = override(config, n_choosing=seeds, n_proof=(2 if quick else 8) * seeds)
+    if config.quick_note:
+        config = override(config, choosing_seed=QUICK_SEEDS[0], proof_seed=QUICK_SEEDS[1])
     return config
 
 
-def search_margin(
-    config: Price, task: str, setup: PriceSetup, alone: Rows
-) -> Generator[Part, Rows, Row]:
-    """Search for the margin of one perception setup, and confirm it on new seeds.
-
-    This generator yields the required parts one after the other. The caller sends it the rows of
-    each.
-
-    Args:
-        config: settings of the study.
-        task: id of the environment.
-        setup: the perception setup.
-        alone: rows of the robot without a shield.
-
-    Raises:
-        HRCError: the workers' motion differs from that in the episodes without a shield.
-    """
-    tried: dict[float, Rows] = {}
-    make_part = partial(_make_part, config, task, setup)
-
-    def measure_rate(margin_m: float) -> Generator[Part, Rows, float]:
-        tried[margin_m] = rows = yield make_part(config.list_seeds(task, config.n_seeds), margin_m)
-        return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
-
-    def confirm(margin_m: float) -> Generator[Part, Rows, Row]:
-        fresh = yield make_part(config.list_seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
-        row = Row(tried, margin_m, fresh)
-        check_walks(task, alone, row)
-        return row
-
-    yield from search(measure_rate, *config.bracket_m, config.level, config.n_search)
-    row = yield from confirm(suppose_margin_m(tried, config.level))
-    for beyond_m in BEYOND_M:  # if the new seeds put the level at an outermost margin
-        end_m = float(row.evaluate(config.level)[0, 0])
-        if not row.ends_at(end_m):
-            return row
-        yield from measure_rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
-    end_m = float(row.evaluate(config.level)[0, 0])
-    # At the outermost margin, the throughput is measured, not extrapolated from another margin.
-    return (yield from confirm(end_m)) if row.ends_at(end_m) else row
-
-
-def _play_unshielded(config: Price, task: str) -> Part:
-    """Return the part with the episodes of a robot without a shield."""
-    (setup,) = find_setups([TRUTH])
-    seeds = config.list_seeds(task, config.n_fresh, FIRST_FRESH)
-    return _make_part(config, task, setup, seeds, 0.0, is_shielded=False)
-
-
-def _compare_levels(
-    config: Price, cache: PartCache, table: Mapping[str, Mapping[str, Row]]
-) -> dict[str, Rows]:
-    """Play the same few episodes with the emulator and with rendered images; return both."""
-    if not config.n_pixels or FOUR not in table[config.task]:
-        return {}
-    margin_m, levels = table[config.task][FOUR].margin_m, ("keypoints", "pixels")
-    (setup,) = find_setups([FOUR])
-    seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
-    parts = [
-        _make_part(config, config.task, _change_level(setup, each), seeds, margin_m)
-        for each in levels
-    ]
-    return dict(zip(levels, cache.make_parts(parts), strict=True))
-
-
-def _change_level(setup: PriceSetup, level: str) -> PriceSetup:
-    """Return a setup with another perception level; the level is appended to the setup's name."""
-    perception = override(setup.perception, level=level)
-    return override(setup, name=f"{FOUR}_{level}", perception=perception)
-
-
-def _make_part(
-    config: Price,
-    task: str,
-    setup: PriceSetup,
-    seeds: list[int],
-    margin_m: float,
-    is_shielded: bool = True,
-) -> Part:
-    """Return the part with the episodes of a setup with one margin."""
-    played = {name: each for name, each in asdict(setup).items() if name not in ("words", "group")}
-    n_steps, driver = config.count_steps(task), config.driver
-    made_of = {
-        "people": PEOPLE, "worker": WORKER, "task": task, "seeds": seeds, "n_steps": n_steps,
-        "setup": played, "margin_m": margin_m, "shield": SHIELD if is_shielded else "",
-        "estimator": hash_source(find_estimator(setup.perception.estimator).make),
-        **driver.settings(),
-    }  # fmt: skip
-    role = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
-    suffix = f"{1e4 * margin_m:+.0f}" if is_shielded else "unshielded"
-    driver = override(driver, agent=carried(driver.agent))
-    make = partial(play_episodes, setup, task, n_steps, is_shielded, driver, seeds, margin_m)
-    label = f"{task}.{setup.name}.{role}.{suffix}"
-    return Part(label, make, make_key(made_of, config.depends), {"margin_m": margin_m})
-
-
-def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> None:
-    """Play parts of a search separately, in any order.
+def replay(config: Price, cache: PartCache, labels: Iterable[str]) -> None:
+    """Play parts of a study separately, in any order.
 
     Args:
         config: settings of the study.
         cache: cache from which every part is requested.
-        margins_m: margins of the parts by label (`_make_part`) [m].
+        labels: labels of the parts (`Price.make_parts`).
     """
-    parts: list[Part] = []
-    for label, margin_m in margins_m.items():
-        task, _, rest = label.partition(".")
-        name, role, suffix = rest.rsplit(".", 2)
-        seeds = {
-            "searched": config.list_seeds(task, config.n_seeds),
-            "fresh": config.list_seeds(task, config.n_fresh, FIRST_FRESH),
-            "pixels": [FIRST_PIXELS + k for k in range(config.n_pixels)],
-        }[role]
-        known, level = (FOUR, name.removeprefix(f"{FOUR}_")) if role == "pixels" else (name, None)
-        (setup,) = find_setups([known])
-        if level is not None:
-            setup = _change_level(setup, level)
-        parts.append(_make_part(config, task, setup, seeds, margin_m, suffix != "unshielded"))
-    cache.make_parts(parts)
+    rows = [
+        (s, each) for s in find_setups(config.setups) for each in config.list_settings(s).values()
+    ]
+    known = {
+        part.label: part
+        for role, listed in ((CHOOSING, rows), (PROOF, [config.reference, *rows]))
+        for setup, setting in listed
+        for part in config.make_parts(role, setup, setting)
+    }
+    cache.make_parts([known[label] for label in labels])
 
 
-def check_walks(task: str, alone: Rows, row: Row) -> None:
-    """Raise `HRCError` if the workers' motion differs from that in episodes without a shield."""
-    if find_task(task).signal is Task.signal and row.fresh["walk"] != alone["walk"]:
+def check_walks(task: str, table: Mapping[str, Mapping[str, Rows]]) -> None:
+    """Raise `HRCError` if the workers' motion differs between settings with the same seeds.
+
+    Workers of tasks in which they wait for the robot are not compared.
+
+    Args:
+        task: id of the environment.
+        table: sums of the episodes, by perception setup and setting.
+    """
+    walks = [rows.get("walk") for settings in table.values() for rows in settings.values()]
+    if find_task(task).signal is Task.signal and any(walk != walks[0] for walk in walks):
         raise HRCError(
             f"In {task} workers moved differently than near other robots, so rows cannot be "
             "compared. Delete the folder's parts and start again."
