@@ -4,7 +4,7 @@
 
 For each seed, PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For
 PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept, based on the
-true cost of the exploring policy in windows of 250,000 steps (1,000 episodes). Both policies are
+true cost of the mean actions in separate episodes, in windows of 250,000 steps. Both policies are
 evaluated on the same fixed seeds; the policy of PPO is also evaluated with a shield.
 """
 
@@ -24,6 +24,7 @@ from benchmarks.command import StudyArguments, run_study
 from benchmarks.common import make_exact
 from benchmarks.learning import Training
 from hrc_env.agents.callbacks import Curve
+from hrc_env.agents.learner_settings import COST_LIMITS
 from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
@@ -40,6 +41,7 @@ from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Ta
 from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
+from hrc_env.tasks import DEFAULT
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 """Names of the subsystems on which trained policies depend."""
@@ -61,7 +63,7 @@ class Variant(NamedTuple):
 
 
 WORDS = {
-    "limited": Variant("PPO-Lagrangian, limit 30", None),
+    "limited": Variant("PPO-Lagrangian", None),
     "fast": Variant("PPO without a safety term, evaluated with `qp`", "qp"),
     "bare": Variant("the same policies, evaluated without a shield", None),
 }
@@ -79,7 +81,7 @@ class LimitedArguments(StudyArguments):
     """Folder for the runs, results.json and the report."""
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds of environments and learner."""
-    cost_limit: float = 30.0
+    cost_limit: float = COST_LIMITS[DEFAULT]
     """Maximum mean cost of an episode."""
     timesteps: int = 3_000_000
     """Number of environment steps of a training run with the cost limit (quick: 8192)."""
@@ -207,8 +209,8 @@ PER_HOUR = 0.36
 NOTE = (
     "`HRCReach-v0`; 1,000 episodes with the policy's mean actions, 95 % intervals, exact for "
     "contacts and those above the force limit of the touched body region. Interventions: times "
-    "that the shield becomes active, per hour. Cost in training: of exploring actions, over the "
-    "last two windows of 1,000 episodes (smallest to largest). Greatest deviation: of one of these "
+    "that the shield becomes active, per hour. Cost in training: of mean actions, over the "
+    "last two windows of 250,000 steps (smallest to largest). Greatest deviation: of one of these "
     "windows from the limit."
 )
 MEASURED = (
