@@ -52,6 +52,9 @@ REFERENCES = {"towards_per_hour": "contacts towards", "approaches_per_hour": "ap
 """Rates with which the costs are compared, by the name of their metric, with their description."""
 COSTS = {"cost": "`cost`", "former_cost": "former cost, `proximity` + `contact`"}
 """Costs that are compared, by the name of their metric, with their description."""
+PERFECT = {"perfect": "greatest possible with the ties of the rate"}
+"""Row of the correlation of a cost that orders all policies as the rate does, with its description.
+It is below 1 if policies are tied, as those without a contact are."""
 
 
 class Standing:
@@ -206,8 +209,9 @@ def correlate_ranks(policies: Sequence[Episodes]) -> dict[str, Metric]:
         policies: episodes of each policy, with the same seeds in the same order.
 
     Returns:
-        The correlations as "rank.COST.RATE", with bootstrap intervals over seeds; `Metric.n` is the
-            number of seeds.
+        The correlations as "rank.COST.RATE", with bootstrap intervals over seeds, and
+            "rank.perfect.RATE", the greatest that ties in the rate allow; `Metric.n` is the number
+            of seeds.
     """
     values = {
         "cost": _get_values(policies, "cost"),
@@ -220,7 +224,7 @@ def correlate_ranks(policies: Sequence[Episodes]) -> dict[str, Metric]:
     def correlate(weights: Ints, cost: Floats, events: Floats) -> Floats:
         return compute_spearman(weights @ cost.T, weights @ events.T)
 
-    return {
+    found = {
         f"rank.{cost}.{rate_name}": bootstrap(
             lambda weights, x=values[cost], y=values[rate_name]: correlate(weights, x, y),
             n_seeds,
@@ -229,6 +233,11 @@ def correlate_ranks(policies: Sequence[Episodes]) -> dict[str, Metric]:
         for cost in COSTS
         for rate_name in REFERENCES
     }
+    for rate_name in REFERENCES:
+        found[f"rank.perfect.{rate_name}"] = bootstrap(
+            lambda weights, y=values[rate_name]: find_greatest_spearman(weights @ y.T), n_seeds, "1"
+        )
+    return found
 
 
 def compute_spearman(a: Floats, b: Floats) -> Floats:
@@ -239,6 +248,15 @@ def compute_spearman(a: Floats, b: Floats) -> Floats:
     ranks = [stats.rankdata(each, axis=1) for each in (a, b)]
     x, y = (each - each.mean(1, keepdims=True) for each in ranks)
     return (x * y).sum(1) / np.sqrt(np.square(x).sum(1) * np.square(y).sum(1))
+
+
+def find_greatest_spearman(values: Floats) -> Floats:
+    """Return the greatest rank correlation (R,) that anything without ties has with values (R, P).
+
+    It is that of an order of the entries of each row that agrees with their values.
+    """
+    order = np.argsort(np.argsort(values, axis=1, kind="stable"), axis=1)
+    return compute_spearman(order.astype(float), values)
 
 
 def _get_values(policies: Sequence[Episodes], statistic: str) -> Floats:
@@ -255,7 +273,7 @@ def make_table(seeds: Sequence[int]) -> Table:
     return Table(
         "ranks",
         "Rank correlation with the cost",
-        {name: (words,) for name, words in COSTS.items()},
+        {name: (words,) for name, words in (COSTS | PERFECT).items()},
         tuple(
             Column(f"rank.{{}}.{name}", f"{words} an hour", 2)
             for name, words in REFERENCES.items()

@@ -154,7 +154,8 @@ def test_the_limit_is_that_of_the_policy_that_is_delivered(is_watched):
 def test_watching_takes_no_random_number_of_the_learner():
     found = []
     for watched in (None, Greedy(2)):
-        learner = PPOLagrangian("MlpPolicy", Greedy(4), n_steps=32, batch_size=64, seed=0, limit=1e9)
+        sizes = {"n_steps": 32, "batch_size": 64}
+        learner = PPOLagrangian("MlpPolicy", Greedy(4), **sizes, seed=0, limit=1e9)
         learner.watch_mean_actions(watched)
         learner.learn(512)
         found.append(learner.policy.action_net.weight.tolist())
@@ -246,8 +247,9 @@ def test_every_task_has_a_budget_and_others_need_a_limit():
     assert fill_in(limited).cost_limit == COST_LIMITS["HRCDelivery-v0"]
     assert fill_in(replace(limited, cost_limit=3.0)).cost_limit == 3.0
     assert fill_in(TrainingRequest()).cost_limit is None
+    own = fill_in(replace(limited, task="Own-v0"))
     with pytest.raises(ConfigError, match="requires a limit, and Own-v0 has no default"):
-        _check_limit(fill_in(replace(limited, task="Own-v0")).cost_limit, "ppo_lagrangian", "Own-v0")
+        _check_limit(own.cost_limit, own.algorithm, own.task)
 
 
 def test_a_limit_that_was_not_kept_is_said_aloud(tmp_path, capsys):
