@@ -136,13 +136,13 @@ learners are `PPOSettings` and `SACSettings`.
 """
 
 COST_LIMITS: Mapping[str, float] = {
-    "HRCReach-v0": 5.0,
-    "HRCReachGoal-v0": 1.0,
-    "HRCPickPlace-v0": 5.0,
-    "HRCPickPlaceGoal-v0": 5.0,
-    "HRCHandover-v0": 20.0,
-    "HRCDrywall-v0": 1.0,
-    "HRCDelivery-v0": 5.0,
+    "HRCReach-v0": 10.0,
+    "HRCReachGoal-v0": 3.5,
+    "HRCPickPlace-v0": 2.5,
+    "HRCPickPlaceGoal-v0": 2.5,
+    "HRCHandover-v0": 12.0,
+    "HRCDrywall-v0": 0.1,
+    "HRCDelivery-v0": 1.0,
 }
 """Budget of each built-in task, by id: the default of `--cost-limit`, the maximum mean cost of an
 episode [control steps]. `python -m benchmarks budgets` measures what it was chosen from.

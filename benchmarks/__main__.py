@@ -223,7 +223,7 @@ class BudgetsArguments(BenchArguments):
 
     out: Path = Path("out/bench_budgets")
     only: tuple[str, ...] = ()
-    """Rows to run, given by prefixes of their names, such as HRCReach-v0.scripted (default: all)."""
+    """Rows to run, given by prefixes of their names, such as HRCReach-v0.random (default: all)."""
     threads: int | None = None
     """Number of threads that step the environments (default: all cores)."""
 
@@ -260,8 +260,8 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed, motion, rare, ranks and budgets. Each takes --quick (minutes
-    instead of hours) and --out DIR, a folder for report.html, results.json and figures.
+    The benchmarks are tracking, perception, speed, motion, rare, ranks and budgets. Each takes
+    --quick (minutes instead of hours) and --out DIR, a folder for report.html, results.json and figures.
     `tracking --help`, for example, describes the other options.
     """
 

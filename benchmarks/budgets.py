@@ -4,7 +4,9 @@
 
 The default cost limit of a task in `python -m hrc_env train --algorithm ppo_lagrangian`
 (`hrc_env.agents.learner_settings.COST_LIMITS`) is between the cost of the scripted agent with the
-shield `qp` and without one. Episodes that end early cost less, because the task is done.
+shield `qp` and without one, if these differ. In `HRCHandover-v0`, bringing the tool to the hand
+costs about the same with every agent; in `HRCDelivery-v0`, only `random` costs anything. Episodes
+that end early, because the task is done, cost less.
 """
 
 from itertools import product

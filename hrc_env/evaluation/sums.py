@@ -44,7 +44,8 @@ RARE = tuple(name for name in STATISTICS if name.startswith("contacts"))
 COST_UNIT = "control steps"
 """Unit of costs."""
 UNITS = {
-    "cost": COST_UNIT, "cost_steps": COST_UNIT, TOUCHING_STEPS: COST_UNIT, "l": "control steps", "seconds": "s",
+    "cost": COST_UNIT, "cost_steps": COST_UNIT, TOUCHING_STEPS: COST_UNIT, "l": "control steps",
+    "seconds": "s",
     "min_separation_m": "m",
 }  # fmt: skip
 """Units of statistics by name; all other statistics have the unit "1"."""
@@ -102,8 +103,8 @@ class EpisodeSums:
         the step before or the episode begins. Without a shield, the number of interventions is NaN.
         An approach is a step in which the robot gets nearer than `CostConfig.proximity_m` to a
         worker while its speed towards the nearest one exceeds `MOVING_M_S`, after a step in which
-        it was near no worker. Contacts with several workers that begin in the same step count as one rated contact, with
-        the largest force.
+        it was near no worker. Contacts with several workers that begin in the same step count as
+        one rated contact, with the largest force.
 
         Args:
             b: index of the environment.

@@ -115,5 +115,5 @@ def test_every_task_has_a_budget_that_is_shown():
 def test_a_budget_is_above_the_cost_of_a_careful_agent_and_below_that_of_the_careless(task):
     metrics = tables.read("budgets").metrics
     assert metrics[f"{task}.budget"].value == COST_LIMITS[task]
-    costs = [metrics[f"{task}.{name}.cost"].value for name in budgets.BEHAVIOURS]
-    assert min(costs) <= COST_LIMITS[task] <= max(costs)
+    costs = [metrics[f"{task}.{name}.cost"] for name in budgets.BEHAVIOURS]
+    assert min(cost.value for cost in costs) <= COST_LIMITS[task] <= max(x.high for x in costs)
