@@ -261,8 +261,8 @@ class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
     The benchmarks are tracking, perception, speed, motion, rare, ranks and budgets. Each takes
-    --quick (minutes instead of hours) and --out DIR, a folder for report.html, results.json and figures.
-    `tracking --help`, for example, describes the other options.
+    --quick (minutes instead of hours) and --out DIR, a folder for report.html, results.json and
+    figures. `tracking --help`, for example, describes the other options.
     """
 
     benchmark: (
