@@ -134,3 +134,16 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
 Other tasks use PPO, control "joint", no demonstrations and 1,000,000 steps. The settings of the
 learners are `PPOSettings` and `SACSettings`.
 """
+
+COST_LIMITS: Mapping[str, float] = {
+    "HRCReach-v0": 10.0,
+    "HRCReachGoal-v0": 3.5,
+    "HRCPickPlace-v0": 2.5,
+    "HRCPickPlaceGoal-v0": 2.5,
+    "HRCHandover-v0": 12.0,
+    "HRCDrywall-v0": 0.1,
+    "HRCDelivery-v0": 1.0,
+}
+"""Budget of each built-in task, by id: the default of `--cost-limit`, the maximum mean cost of an
+episode [control steps]. `python -m benchmarks budgets` measures what it was chosen from.
+"""

@@ -3,7 +3,9 @@
 A Lagrange multiplier weighs the advantage of the cost against that of the reward (Ray et al. 2019,
 "Benchmarking Safe Exploration in Deep Reinforcement Learning"). It is updated by a PI controller of
 the constraint violation (Stooke et al. 2020, arXiv:2007.03964). Costs are those of `info["cost"]`,
-which are computed from the true state.
+which are computed from the true state. The delivered policy acts with the mean actions, which cost
+more or less than the exploring ones; the multiplier is therefore updated from the cost of mean
+actions in environments of their own (`PPOLagrangian.watch_mean_actions`).
 """
 
 import copy
@@ -87,7 +89,7 @@ class PPOLagrangian(PPO):
     """
 
     def __init__(
-        self, *args: Any, limit: float = 30.0, episode_steps: int = 250, **kwargs: Any
+        self, *args: Any, limit: float = 10.0, episode_steps: int = 250, **kwargs: Any
     ) -> None:
         self.multiplier, self.episode_steps = Multiplier(limit), episode_steps
         self.share = 1.0
@@ -95,6 +97,8 @@ class PPOLagrangian(PPO):
         the task first.
         """
         self.spread, self.discounted = RunningMeanStd(), np.zeros(1)
+        self._watched: VecEnv | None = None
+        self._watched_observation: Any = None
         super().__init__(*args, **kwargs)
 
     def _setup_model(self) -> None:
@@ -111,7 +115,20 @@ class PPOLagrangian(PPO):
         return [*names, "cost_critic", "cost_optimizer"], variables
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "_costs", "_beyond"]
+        own = ("_costs", "_beyond", "_watched", "_watched_observation")
+        return [*super()._excluded_save_params(), *own]
+
+    def watch_mean_actions(self, env: VecEnv | None) -> None:
+        """Update the multiplier from the cost of mean actions from the next rollout on.
+
+        After each rollout, the policy acts for as many steps in these environments, which continue
+        where they stopped before. Checkpoints do not contain them.
+
+        Args:
+            env: environments that no one else steps, with `cost` in their infos; None: the
+                multiplier is updated from the cost of the exploring actions.
+        """
+        self._watched, self._watched_observation = env, None
 
     def collect_rollouts(
         self,
@@ -129,7 +146,9 @@ class PPOLagrangian(PPO):
         if not super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps):
             return False
         costs = np.array(self._costs)
-        self.multiplier.update(float(costs.mean()) * self.episode_steps, self.share)
+        exploring = float(costs.mean()) * self.episode_steps
+        delivered = self._measure_mean_actions() * self.episode_steps
+        self.multiplier.update(exploring if self._watched is None else delivered, self.share)
         cost_rollout = self._evaluate_costs(costs, rollout_buffer)
         loss = self._learn(cost_rollout)
         value = self.multiplier.value
@@ -137,9 +156,26 @@ class PPOLagrangian(PPO):
         mixed = mixed - value * _normalize(cost_rollout.advantages)
         rollout_buffer.advantages = (mixed / (1 + value)).astype(np.float32)
         metrics = {"multiplier": value, "cost": self.multiplier.cost, "critic_loss": loss}
+        metrics["exploring_cost"] = exploring
         for name, number in {**metrics, "limit": self.multiplier.limit}.items():
             self.logger.record(f"lagrangian/{name}", number)
         return True
+
+    def _measure_mean_actions(self) -> float:
+        """Act with mean actions for a rollout; return the mean cost of a step, or NaN if unwatched.
+
+        The random numbers of the learner are not used.
+        """
+        env, costs = self._watched, list[float]()
+        if env is None:
+            return float("nan")
+        if self._watched_observation is None:
+            self._watched_observation = env.reset()
+        for _ in range(self.n_steps):
+            actions, _ = self.policy.predict(self._watched_observation, deterministic=True)
+            self._watched_observation, _, _, infos = env.step(actions)
+            costs += [info["cost"] for info in infos]
+        return float(np.mean(costs))
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: Any = None) -> None:
         """Store the costs of a step, and the cost critic's values of truncated episodes.

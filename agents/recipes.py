@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .learner_settings import COST_LIMITS
 from .learner_settings import RECIPES as RECIPES
 from .requests import TrainingRequest
 
@@ -27,7 +28,9 @@ def fill_in(arguments: TrainingRequest) -> Run:
     """Return the arguments, with those that are None replaced by the recipe of their task."""
     recipe = RECIPES.get(arguments.task, {})
     if arguments.algorithm == "ppo_lagrangian":
-        recipe = {**(recipe if recipe.get("algorithm", "ppo") == "ppo" else {}), **LIMITED}
+        budget = {"cost_limit": COST_LIMITS.get(arguments.task)}
+        ours = recipe if recipe.get("algorithm", "ppo") == "ppo" else {}
+        recipe = {**ours, **LIMITED, **budget}
     elif arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):
         recipe = {}  # the recipe is for another learner
     given = {name: each for name, each in vars(arguments).items() if each is not None}

@@ -23,8 +23,9 @@ class TrainingRequest(EnvironmentArguments):
     control, demonstrations and timesteps.
     """
     cost_limit: float | None = None
-    """With ppo_lagrangian: maximum cost of an episode (info["cost"], computed from the true state)
-    [control steps].
+    """With ppo_lagrangian: maximum mean cost of an episode with the mean actions of the delivered
+    policy (info["cost"], computed from the true state) [control steps] (default: the budget of the
+    task, docs/safe_rl.md).
     """
     her: bool | None = None
     """With sac: whether transitions are also relabelled with other goals, True or False (default:

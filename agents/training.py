@@ -4,7 +4,7 @@ import json
 import shlex
 import time
 import warnings
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, fields, replace
 from functools import partial
 from pathlib import Path
@@ -61,6 +61,9 @@ SETTINGS = {
 """Settings of the learners, by the name of the algorithm."""
 DEMONSTRATION_SEED = 2_000_000
 """Seed of the first demonstration; the seeds of training and evaluation are in other ranges."""
+WATCHED_SEED, WATCHED_PART = 500_000_000, 4
+"""Seed of the environments in which mean actions are watched, far from all others; and number of
+environments of the training for each of them."""
 ONLY_OF_A_RUN = (
     "out", "timesteps", "threads", "episodes", "film", "resume", "engine", "workers", "address",
 )  # fmt: skip
@@ -251,12 +254,23 @@ def _make_envs(arguments: Run) -> HRCVecEnv:
 def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrupt) -> None:
     """Train with Stable-Baselines3, starting from the current state of the learner."""
     learner, curriculum = log.learner, Curriculum(Ramp(arguments.ramp), env)
-    learner.learn(
-        arguments.timesteps - learner.num_timesteps,
-        callback=[curriculum, TrainingMonitor(log, curriculum, interrupt)],
-        reset_num_timesteps=arguments.resume is None,
-        tb_log_name=arguments.algorithm,
-    )
+    with ExitStack() as stack:
+        if isinstance(learner, PPOLagrangian):
+            watched = stack.enter_context(closing(_make_watched_envs(arguments, learner)))
+            learner.watch_mean_actions(watched)
+        learner.learn(
+            arguments.timesteps - learner.num_timesteps,
+            callback=[curriculum, TrainingMonitor(log, curriculum, interrupt)],
+            reset_num_timesteps=arguments.resume is None,
+            tb_log_name=arguments.algorithm,
+        )
+
+
+def _make_watched_envs(arguments: Run, learner: PPOLagrangian) -> HRCVecEnv:
+    """Return the environments in which PPO-Lagrangian measures the cost of mean actions."""
+    n, seed = max(arguments.num_envs // WATCHED_PART, 1), WATCHED_SEED + arguments.seed
+    seed += learner.num_timesteps  # other episodes than those of the first part of a resumed run
+    return HRCVecEnv(n, stagger=True, seed=seed, **arguments.batched_keywords())
 
 
 def _make_learner(

@@ -1,12 +1,12 @@
 """The command `python -m benchmarks`.
 
 It runs the benchmarks of the estimators, the detector, the speed, the motion of workers, rare
-contacts and people searched for contacts, and renders a gallery.
+contacts, people searched for contacts and the cost, and renders a gallery.
 """
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -230,6 +230,52 @@ class AdversaryArguments(BenchArguments):
 
 
 @dataclass(frozen=True)
+class RanksArguments(BenchArguments):
+    """Compare the rank order of twenty policies by cost with that by contacts and approaches."""
+
+    out: Path = Path("out/bench_ranks")
+    episodes: int | None = None
+    """Number of episodes of each policy (default: 500, quick: 8)."""
+    first_seed: int | None = None
+    """Seed of the first episode (default: 18310000, quick: 18200000)."""
+    threads: int | None = None
+    """Number of threads that step the environments (default: all cores)."""
+
+    def run(self) -> int:
+        """Run the benchmark and print its tables; return the exit status."""
+        for name in ("episodes", "threads"):
+            check_at_least(f"--{name}", getattr(self, name), 1)
+        check_at_least("--first-seed", self.first_seed, 0)
+        from benchmarks.ranks import QUICK, RanksBench
+
+        config = override(QUICK if self.quick else RanksBench(), n_episodes=self.episodes)
+        return self.show(override(config, first_seed=self.first_seed, threads=self.threads))
+
+
+@dataclass(frozen=True)
+class BudgetsArguments(BenchArguments):
+    """Measure the cost per episode of scripted and random agents in every task.
+
+    The default cost limits of `train` were chosen from these numbers.
+    """
+
+    out: Path = Path("out/bench_budgets")
+    only: tuple[str, ...] = ()
+    """Rows to run, given by prefixes of their names, such as HRCReach-v0.random (default: all)."""
+    threads: int | None = None
+    """Number of threads that step the environments (default: all cores)."""
+
+    def run(self) -> int:
+        """Run the benchmark and print its table; return the exit status."""
+        check_at_least("--threads", self.threads, 1)
+        from benchmarks.budgets import make_study
+
+        study = make_study()
+        study = study.select(self.only) if self.only else study
+        return self.show(replace(study.shorten() if self.quick else study, threads=self.threads))
+
+
+@dataclass(frozen=True)
 class Gallery:
     """Render all workers, a film strip of each motion, and both scenes from all cameras."""
 
@@ -252,9 +298,9 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed, motion, rare and adversary. Each takes --quick
-    (minutes instead of hours) and --out DIR, a folder for report.html, results.json and figures.
-    `tracking --help`, for example, describes the other options.
+    The benchmarks are tracking, perception, speed, motion, rare, adversary, ranks and budgets.
+    Each takes --quick (minutes instead of hours) and --out DIR, a folder for report.html,
+    results.json and figures. `tracking --help`, for example, describes the other options.
     """
 
     benchmark: (
@@ -264,6 +310,8 @@ class Benchmarks:
         | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
         | Annotated[RareArguments, tyro.conf.subcommand("rare")]
         | Annotated[AdversaryArguments, tyro.conf.subcommand("adversary")]
+        | Annotated[RanksArguments, tyro.conf.subcommand("ranks")]
+        | Annotated[BudgetsArguments, tyro.conf.subcommand("budgets")]
         | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     )
     """Benchmark to run."""

@@ -4,7 +4,7 @@
 
 For each seed, PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For
 PPO-Lagrangian, the table shows when the limit was reached and how closely it was kept, based on the
-true cost of the exploring policy in windows of 250,000 steps (1,000 episodes). Both policies are
+true cost of the mean actions in separate episodes, in windows of 250,000 steps. Both policies are
 evaluated on the same fixed seeds; the policy of PPO is also evaluated with a shield. Learners are
 compared by the interquartile mean over all seeds with its stratified bootstrap interval.
 """
@@ -25,6 +25,7 @@ from benchmarks.command import StudyArguments, run_study
 from benchmarks.common import make_exact
 from benchmarks.learning import SAFETY_OF_POLICY, Training, summarize_runs
 from hrc_env.agents.callbacks import Curve
+from hrc_env.agents.learner_settings import COST_LIMITS
 from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
@@ -35,6 +36,7 @@ from hrc_env.experiments.report import SHIELD_CHOSEN_ON, Conditions, Metrics, Ta
 from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import make_key
+from hrc_env.tasks import DEFAULT
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 """Names of the subsystems on which trained policies depend."""
@@ -56,7 +58,7 @@ class Variant(NamedTuple):
 
 
 WORDS = {
-    "limited": Variant("PPO-Lagrangian, limit 30", None),
+    "limited": Variant("PPO-Lagrangian", None),
     "fast": Variant("PPO without a safety term, evaluated with `qp`", "qp"),
     "bare": Variant("the same policies, evaluated without a shield", None),
 }
@@ -74,7 +76,7 @@ class LimitedArguments(StudyArguments):
     """Folder for the runs, results.json and the report."""
     seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
     """Seeds of environments and learner."""
-    cost_limit: float = 30.0
+    cost_limit: float = COST_LIMITS[DEFAULT]
     """Maximum mean cost of an episode."""
     timesteps: int = 3_000_000
     """Number of environment steps of a training run with the cost limit (quick: 8192)."""
@@ -214,8 +216,8 @@ NOTE = (
     "mean of goals, cost and interventions per hour over the policies, with 95 % stratified "
     "bootstrap intervals from five seeds on; contacts towards and above the force limit of the "
     "touched body region of all policies together, with exact intervals. Cost in training: of "
-    "exploring actions, median of the last two windows of 1,000 episodes. Greatest deviation: of "
-    "one of these windows from the limit."
+    "mean actions, median of the last two windows of 250,000 steps. Greatest deviation: of one of "
+    "these windows from the limit."
 )
 COLUMNS: tuple[Any, ...] = (
     *(column for column in SAFETY_OF_POLICY if column.heading),

@@ -204,6 +204,10 @@ STUDIES: dict[str, Study] = {
             "python -m benchmarks.kept", 3, (*KEYPOINTS, "shield", "agents"), ("kept",),
             made=ExperimentSource("benchmarks.kept"),
         ),
+        "budgets": Command(
+            BENCH + "budgets", 5, (*KEYPOINTS, "shield", "agents"), ("budgets",),
+            made=ExperimentSource("benchmarks.budgets"),
+        ),
         "learners": Command(
             "python -m benchmarks.learners", 240, (*KEYPOINTS, "agents"), ("learners",),
             is_release=True,

@@ -263,7 +263,7 @@ env = gymnasium.make(
 - `v0`: first version, which may change until 0.1.0 is released ([promise of an
   id](../versions.md#environment-ids)).
 """
-COSTS = ("cost_proximity", "cost_contact", "cost", "episode_cost")
+COSTS = ("cost_unsafe", "cost", "episode_cost", "cost_proximity", "cost_contact")
 """Keys of infos that a page of a task explains."""
 
 

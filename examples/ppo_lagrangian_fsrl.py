@@ -38,7 +38,7 @@ class Arguments:
 
     timesteps: int = 1_000_000
     """Environment steps in all."""
-    cost_limit: float = 30.0
+    cost_limit: float = 10.0
     """Cost limit of an episode."""
     num_envs: int = 4
     """Number of environments, stepped one after the other; each plays an episode between

@@ -18,16 +18,19 @@ from hrc_env.safety.incidents import Incident, IncidentMonitor
 from hrc_env.tracking import metrics
 
 
-def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: CostConfig) -> Info:
+def cost_info(
+    cost: Cost, happened: Records2[Incident], pushed: Bools, present: Bools, config: CostConfig
+) -> Info:
     """Return the cost, its parts and the separation, under the names that safe-RL libraries read.
 
     Args:
         cost: the cost of the step.
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.
+        pushed: mask (B, W) of the workers whose touch moves the robot.
         present: mask (B, W) of the workers that are in the scene.
         config: settings of the cost.
     """
-    parts = split_cost(cost, happened, config)
+    parts = split_cost(cost, happened, pushed, config)
     total = sum_cost(parts, config)
     return {
         "cost": total,

@@ -563,10 +563,11 @@ class Simulation(Stateful):
         config, paths = self.config, require(truth.paths, "The true paths of a step")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
+        pushed = self.monitor.find_pushed(truth.world, paths, command.velocities)
         terms = self._reward_terms(command, truth, belief)
         activity = generator.activity(self.motion)
         present = activity != generator.ABSENT
-        counted = infos.cost_info(cost, happened, present, config.cost)
+        counted = infos.cost_info(cost, happened, pushed, present, config.cost)
         self.episode_cost += counted["cost"]
         self.separation_m = cost.min_separation_m
         info = check_keys(self.keys, {

@@ -132,7 +132,8 @@ def test_reward_is_the_sum_of_its_terms_in_info():
 def test_cost_is_in_every_step_and_adds_up():
     total = 0.0
     for _, _, info in roll(make(perception="truth"), 250, seed=2)[1:]:
-        assert info["cost"] == info["cost_sum"] == info["cost_proximity"] + info["cost_contact"]
+        assert info["cost"] == info["cost_sum"] == info["cost_unsafe"]
+        assert info["cost"] in (0.0, 1.0)
         total += info["cost"]
         assert info["episode_cost"] == total
 
@@ -242,7 +243,7 @@ def test_a_reset_costs_nothing_and_knows_the_separation():
     _, info = env.reset(seed=0)
     costs = {name: value for name, value in info.items() if "cost" in name}
     assert costs == dict.fromkeys(
-        ("cost", "cost_sum", "cost_proximity", "cost_contact", "episode_cost"), 0.0
+        ("cost", "cost_sum", "cost_proximity", "cost_contact", "cost_unsafe", "episode_cost"), 0.0
     )
     now_m = env.step(np.zeros(6, np.float32))[-1]["safety/min_separation_m"]
     assert info["safety/min_separation_m"] == pytest.approx(now_m, abs=0.1)

@@ -1,6 +1,7 @@
 """PPO with a limit of cost: what its multiplier does, that it keeps a limit, and its runs."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,14 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from hrc_env.__main__ import main
 from hrc_env.agents import checkpoints
+from hrc_env.agents.learner_settings import COST_LIMITS
 from hrc_env.agents.ppo_lagrangian import Multiplier, PPOLagrangian
+from hrc_env.agents.recipes import fill_in
+from hrc_env.agents.requests import TrainingRequest
+from hrc_env.cli.train import _check_limit
 from hrc_env.core.errors import ConfigError
 from hrc_env.sb3 import HRCVecEnv
+from hrc_env.tasks import BUILT_IN
 
 pytestmark = pytest.mark.slow  # learners are trained
 
@@ -107,6 +113,55 @@ def test_it_earns_what_its_limit_allows_and_no_more(limit, cost):
     assert np.mean(costs[-len(costs) // 3 :]) == pytest.approx(cost, rel=0.1)
 
 
+class Steep(Greedy):
+    """Noise costs: the cost of a step grows with the fourth power of the action."""
+
+    def step_wait(self):
+        observation, reward, done, infos = super().step_wait()
+        return observation, reward, done, [each | {"cost": each["cost"] ** 4} for each in infos]
+
+
+def cost_of_mean_actions(learner):
+    env = Steep(1)
+    actions, _ = learner.predict(env.reset(), deterministic=True)
+    env.step_async(actions)
+    return 10 * env.step_wait()[3][0]["cost"]
+
+
+@pytest.mark.parametrize("is_watched", [True, False])
+def test_the_limit_is_that_of_the_policy_that_is_delivered(is_watched):
+    """Which acts by the mean; exploring actions at the limit say nothing of it."""
+    learner = PPOLagrangian(
+        "MlpPolicy", Steep(16), n_steps=32, batch_size=256, n_epochs=5, learning_rate=1e-3,
+        gamma=0.9, seed=0, limit=1.0, episode_steps=10, policy_kwargs={"net_arch": [16]},
+    )  # fmt: skip
+    learner.watch_mean_actions(Steep(4) if is_watched else None)
+    delivered = []
+
+    def note(*_):
+        delivered.append(cost_of_mean_actions(learner))
+        return True
+
+    learner.learn(150 * 512, callback=note)
+    last = len(delivered) // 3
+    assert (np.mean(delivered[-last:]) == pytest.approx(1.0, rel=0.15)) == is_watched
+    if is_watched:
+        assert 10 * np.mean(learner._costs) > 1.2
+    else:
+        assert learner.multiplier.cost == pytest.approx(1.0, rel=0.15)
+
+
+def test_watching_takes_no_random_number_of_the_learner():
+    found = []
+    for watched in (None, Greedy(2)):
+        sizes = {"n_steps": 32, "batch_size": 64}
+        learner = PPOLagrangian("MlpPolicy", Greedy(4), **sizes, seed=0, limit=1e9)
+        learner.watch_mean_actions(watched)
+        learner.learn(512)
+        found.append(learner.policy.action_net.weight.tolist())
+    assert found[0] == found[1]
+
+
 def test_what_is_beyond_a_time_limit_counts_as_the_critic_says():
     """The critic of who always costs 1 a step, in episodes that only time ends, is flat."""
     learner = PPOLagrangian(
@@ -175,9 +230,9 @@ def test_a_run_with_a_limit_resumes(run):
         (["--cost-limit", "30"], "requires ppo_lagrangian, and ppo ignores cost"),
         (["--algorithm", "sac", "--cost-limit", "30"], "and sac ignores cost"),
         ([*LIMITED[:3], "-3"], "--cost-limit must be above 0, got -3"),
+        ([*LIMITED[:3], "0"], "The default of HRCReach-v0 is"),
         ([*LIMITED[:3], "0"], "A shield reduces the cost"),
         ([*LIMITED[:3], "nan"], "--cost-limit must be above 0"),
-        (LIMITED[:2], "requires a limit, for example --cost-limit 30"),
         (["--shield", "sm"], "Unknown shield 'sm'"),
     ],
 )
@@ -186,8 +241,20 @@ def test_a_limit_that_cannot_be_is_refused_in_words(words, says, tmp_path, capsy
     assert says in " ".join(capsys.readouterr().err.split())
 
 
+def test_every_task_has_a_budget_and_others_need_a_limit():
+    assert {*COST_LIMITS} == {*BUILT_IN}
+    limited = TrainingRequest(algorithm="ppo_lagrangian", task="HRCDelivery-v0")
+    assert fill_in(limited).cost_limit == COST_LIMITS["HRCDelivery-v0"]
+    assert fill_in(replace(limited, cost_limit=3.0)).cost_limit == 3.0
+    assert fill_in(TrainingRequest()).cost_limit is None
+    own = fill_in(replace(limited, task="Own-v0"))
+    with pytest.raises(ConfigError, match="requires a limit, and Own-v0 has no default"):
+        _check_limit(own.cost_limit, own.algorithm, own.task)
+
+
 def test_a_limit_that_was_not_kept_is_said_aloud(tmp_path, capsys):
     words = [*LIMITED[:3], "0.001", "--timesteps", "256", "--people", "headlong"]
     words += ["--episodes", "16", "--out", str(tmp_path / "run")]
+    words += ["--config", "cost.proximity_m=1.0"]
     assert main(["train", *TINY, *words]) == 0
     assert "The limit of 0.001 is exceeded" in " ".join(capsys.readouterr().out.split())

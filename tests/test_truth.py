@@ -137,10 +137,24 @@ def onto_the_robot(points):
 
 @pytest.mark.parametrize("level", LEVELS[1:])
 def test_cost_follows_the_truth_and_not_the_belief(level):
-    """Bodies that truly stand in the robot, unseen, cost in every part; nothing else moves."""
+    """Bodies that truly stand in the robot, unseen, are near and touched; nothing else moves."""
     moved = differences(partial(single, level), displaced(onto_the_robot), n_steps=8)
     assert leaks(moved) == {}
-    assert {"info/cost/", "info/cost_proximity/", "info/cost_contact/"} <= moved.keys()
+    assert {"info/cost_proximity/", "info/cost_contact/"} <= moved.keys()
+
+
+def beside_the_robot(points):
+    return 0.3 * points + np.array([-0.6, 0.5, 0.8])
+
+
+@pytest.mark.parametrize("level", LEVELS[1:])
+def test_whom_the_robot_endangers_is_the_true_worker(level):
+    """Who truly stands beside the robot, unseen, is endangered by it: only the cost moves."""
+    make = partial(single, level, config={**CHOSEN["config"], "cost": {"proximity_m": 1.0}})
+    perturb = displaced(beside_the_robot)
+    moved = differences(make, perturb, agent="scripted", n_steps=30)
+    assert leaks(moved) == {}
+    assert {"info/cost/", "info/cost_unsafe/", "info/episode_cost/"} <= moved.keys()
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
@@ -159,7 +173,7 @@ def test_of_the_level_truth_the_reward_follows_the_belief_and_cost_the_truth():
     assert {"info/safety/min_separation_m/", "info/tracking/mpjpe_m/"} <= told.keys()
     shown = differences(make, displaced(shifted, told=False), agent="random")
     assert {"observation/", "reward and ends/", "info/reward/proximity/"} <= shown.keys()
-    assert "info/cost_proximity/" not in shown
+    assert not [name for name in shown if name.startswith("info/cost")]
     assert "info/safety/min_separation_m/" not in shown
 
 

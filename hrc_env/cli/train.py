@@ -35,7 +35,7 @@ class Train(TrainingRequest):
         mine = fill_in(self)
         check_at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
-        _check_limit(self.cost_limit, mine.algorithm)
+        _check_limit(mine.cost_limit, mine.algorithm, mine.task)
         self._check_shield()
         if self.her and mine.algorithm != "sac":
             raise ConfigError(
@@ -83,12 +83,16 @@ class Train(TrainingRequest):
             )
 
 
-def _check_limit(limit: float | None, algorithm: str) -> None:
+def _check_limit(limit: float | None, algorithm: str, task: str) -> None:
+    """Raise `ConfigError` for a cost limit that is not positive, missing or ignored."""
+    from hrc_env.agents.learner_settings import COST_LIMITS  # here: it imports the agents
+
     has_limit = algorithm == "ppo_lagrangian"
     if limit is not None and not (math.isfinite(limit) and limit > 0):
+        budget = f"The default of {task} is {COST_LIMITS[task]:g}. " if task in COST_LIMITS else ""
         raise ConfigError(
-            f"--cost-limit must be above 0, got {limit:g}. Without a limit, an episode costs about "
-            "70; a limit of 30 can be reached. A shield reduces the cost further."
+            f"--cost-limit must be above 0, got {limit:g}. {budget}A shield reduces the cost "
+            "further."
         )
     if limit is not None and not has_limit:
         raise ConfigError(
@@ -97,5 +101,6 @@ def _check_limit(limit: float | None, algorithm: str) -> None:
         )
     if has_limit and limit is None:
         raise ConfigError(
-            "--algorithm ppo_lagrangian requires a limit, for example --cost-limit 30."
+            f"--algorithm ppo_lagrangian requires a limit, and {task} has no default: use, for "
+            "example, --cost-limit 10."
         )

@@ -126,13 +126,18 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1",
         "whether the true surfaces touched in any physics substep, according to their distance",
     ),
+    "cost_unsafe": Entry(
+        "0 or 1",
+        "whether the robot endangered a worker: it was closer than `cost.proximity_m` while it "
+        "moved towards the worker at more than 0.05 m/s, moved into a contact, or fled too late "
+        "from one above the force limit of the body region; 0 while it stands",
+    ),
     "cost": Entry(
         "control steps",
-        "sum of `cost.components`: by default 1 for a step closer than `cost.proximity_m` and 1 "
-        "for a step with a touch; 0 after a reset. Other components are `towards` (contacts that "
-        "begin while the robot moves towards the worker), `force` (the `contact_force_ratio` of "
-        "contacts), `separation_violated` and `near_miss`. Each selected component also has a key "
-        "`cost_<name>`",
+        "sum of `cost.components`: by default `cost_unsafe`; 0 after a reset. Other components are "
+        "`proximity`, `contact`, `towards` (contacts that begin while the robot moves towards the "
+        "worker), `force` (the `contact_force_ratio` of contacts), `separation_violated` and "
+        "`near_miss`. Each selected component also has a key `cost_<name>`",
     ),
     "cost_sum": Entry(
         "control steps", "equal to `cost`, under the key that some safe-RL libraries expect"

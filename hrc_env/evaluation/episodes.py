@@ -172,8 +172,10 @@ def evaluate_episodes(
 
     Returns:
         One dictionary per episode: the return `r`, the length `l` [control steps] and `seconds`
-            [s]; `cost` and `cost_steps`, its part from steps near a worker [control steps];
-            `contacts`, and of these `contacts_towards`, `contacts_fleeing` and `contacts_standing`;
+            [s]; `cost`, and the numbers of steps near a worker (`cost_steps`) and in contact
+            (`contact_steps`) [control steps]; `approaches`, in which the robot comes near a worker
+            at more than 0.05 m/s; `contacts`, and of these `contacts_towards`,
+            `contacts_fleeing` and `contacts_standing`;
             `contacts_rated`, those with an estimated force, and of these `contacts_above_limit`;
             `interventions` of the shield, NaN without one; `goals_reached` and `goals_missed`;
             `success`; and `min_separation_m` [m].

@@ -7,23 +7,26 @@ import numpy as np
 
 from hrc_env.core.infos import Info
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.safety.incidents import KINDS
+from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.tasks.task import Task
 
 COSTS = ("cost", "cost_proximity", "cost_contact")
 """Infos that are summed over an episode."""
-SEVERITY, FORCE, ACTIVE = (
+SEVERITY, FORCE, ACTIVE, COMING = (
     "safety/contact_severity", "safety/contact_force_ratio", "shield/active",
+    "safety/robot_towards_m_s",
 )  # fmt: skip
-"""Infos from which severe contacts and interventions are counted; the severity is 0 if no contact
-begins in the step."""
+"""Infos from which severe contacts, interventions and approaches are counted; the severity is 0 if
+no contact begins in the step."""
 RATED, ABOVE, INTERVENTIONS = "contacts_rated", "contacts_above_limit", "interventions"
 """Names of the statistics that count contacts with an estimated force, those of them with a force
 above the limit of the touched region, and interventions of the shield."""
+APPROACHES, TOUCHING_STEPS = "approaches", "contact_steps"
+"""Names of the statistics that count approaches and steps with a contact."""
 SUMS = np.dtype([
     (name, "f8")
     for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m", RATED, ABOVE,
-                 INTERVENTIONS, "active")
+                 INTERVENTIONS, "active", APPROACHES, "near")
 ])  # fmt: skip
 """Data type of the sums over the current episode. A lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
@@ -31,7 +34,7 @@ ACHIEVED, FAILED = "goals_reached", "goals_missed"
 `Task.failed`)."""
 
 STATISTICS = (
-    "r", "l", "seconds", "cost", "cost_steps", "contacts",
+    "r", "l", "seconds", "cost", "cost_steps", TOUCHING_STEPS, APPROACHES, "contacts",
     *(f"contacts_{kind}" for kind in KINDS), RATED, ABOVE, INTERVENTIONS, ACHIEVED, FAILED,
     "success", "min_separation_m",
 )  # fmt: skip
@@ -41,7 +44,8 @@ RARE = tuple(name for name in STATISTICS if name.startswith("contacts"))
 COST_UNIT = "control steps"
 """Unit of costs."""
 UNITS = {
-    "cost": COST_UNIT, "cost_steps": COST_UNIT, "l": "control steps", "seconds": "s",
+    "cost": COST_UNIT, "cost_steps": COST_UNIT, TOUCHING_STEPS: COST_UNIT, "l": "control steps",
+    "seconds": "s",
     "min_separation_m": "m",
 }  # fmt: skip
 """Units of statistics by name; all other statistics have the unit "1"."""
@@ -81,6 +85,11 @@ class EpisodeSums:
         begins = np.where(np.isnan(active), np.nan, active > sums["active"])
         sums[INTERVENTIONS] += begins
         sums["active"] = active
+        near, coming_m_s = costs["cost_proximity"], read_step_value(infos, COMING, len(sums))
+        enters = near > sums["near"]
+        is_unknown = np.isnan(near) | (enters & np.isnan(coming_m_s))
+        sums[APPROACHES] += np.where(is_unknown, np.nan, enters & (coming_m_s > MOVING_M_S))
+        sums["near"] = near
         separation_m = read_step_value(infos, "safety/min_separation_m", len(sums))
         sums["nearest_m"] = np.fmin(sums["nearest_m"], separation_m)
         return costs["cost"]
@@ -92,8 +101,10 @@ class EpisodeSums:
 
         An intervention begins when the shield becomes active: `shield/active` is 1, and was 0 in
         the step before or the episode begins. Without a shield, the number of interventions is NaN.
-        Contacts with several workers that begin in the same step count as one rated contact, with
-        the largest force.
+        An approach is a step in which the robot gets nearer than `CostConfig.proximity_m` to a
+        worker while its speed towards the nearest one exceeds `MOVING_M_S`, after a step in which
+        it was near no worker. Contacts with several workers that begin in the same step count as
+        one rated contact, with the largest force.
 
         Args:
             b: index of the environment.
@@ -109,6 +120,8 @@ class EpisodeSums:
             "seconds": float(episode["steps"] * ctrl_dt_s),
             "cost": float(episode["cost"]),
             "cost_steps": float(episode["cost_proximity"]),
+            TOUCHING_STEPS: float(episode["cost_contact"]),
+            APPROACHES: float(episode[APPROACHES]),
             "contacts": float(episode["contacts"]),
             **{f"contacts_{kind}": info[f"safety/contacts_{kind}"] for kind in KINDS},
             RATED: float(episode[RATED]),

@@ -20,6 +20,7 @@ from hrc_env.evaluation import intervals
 from hrc_env.evaluation.sums import (
     ABOVE,
     ACHIEVED,
+    APPROACHES,
     FAILED,
     INTERVENTIONS,
     RARE,
@@ -344,7 +345,7 @@ def _estimate(statistic: str, values: Floats, exposure: Floats, unit: str) -> Me
     """Return the sum of a statistic per exposure, with the interval that its kind requires."""
     if statistic in RARE:
         return intervals.estimate_rate(values, exposure, unit)
-    if statistic == INTERVENTIONS:
+    if statistic in (INTERVENTIONS, APPROACHES):
         return intervals.estimate_burst_rate(values, exposure, unit)
     if statistic in (ACHIEVED, FAILED):
         return intervals.estimate_goal_rate(values, exposure, unit)

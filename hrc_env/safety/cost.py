@@ -32,15 +32,15 @@ FORMER_COMPONENT = "too_near"
 class CostConfig:
     """Settings of the cost: unsafe events, and whether a contact ends the episode."""
 
-    components: tuple[str, ...] = ("proximity", "contact")
-    """Components that are added up: "proximity", 1 for a step nearer than `proximity_m`; "contact",
-    1 for a step with a contact; "unsafe", an indicator for constraints (`find_unsafe`), which is 0
-    while the robot stands; "towards", contacts that begin while the robot moves towards the
-    worker; "force", forces of contacts relative to the permitted ones; "separation_violated", 1 for
-    a step within the protective distance while approaching; "near_miss". With the default
-    components, the cost is a number of control steps."""
+    components: tuple[str, ...] = ("unsafe",)
+    """Components that are added up: "unsafe", 1 for a step in which the robot endangers a worker,
+    which it never does while it stands (`find_unsafe`); "proximity", 1 for a step nearer than
+    `proximity_m`; "contact", 1 for a step with a contact; "towards", contacts that begin while the
+    robot moves towards the worker; "force", forces of contacts relative to the permitted ones;
+    "separation_violated", 1 for a step within the protective distance while approaching;
+    "near_miss". With the first three, the cost is a number of control steps."""
     proximity_m: float = 0.15
-    """True separation between surfaces below which a step costs 1 [m]."""
+    """True separation between surfaces below which a robot is near [m]."""
     contact_terminates: bool = False
     """Whether a contact ends the episode."""
 
@@ -90,24 +90,29 @@ def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
     )
 
 
-def find_unsafe(cost: Cost, incidents: Records2[Incident]) -> Floats:
+def find_unsafe(cost: Cost, incidents: Records2[Incident], pushed: Bools) -> Floats:
     """Return 1 for environments in which the robot endangered a worker in a step, otherwise 0 (B,).
 
     A step is unsafe if the robot is near a worker and its directed speed exceeds `MOVING_M_S`, if
     it moves into a contact, or if it retreats too late from a contact with more force than the
-    touched region tolerates. A standing robot that is touched is safe.
+    touched region tolerates. A standing robot that is touched is safe, whatever the force, and also
+    while it springs back.
 
     Args:
         cost: cost from separations.
         incidents: (B, W) incidents of the step.
+        pushed: (B, W) mask of the workers whose touch moves the robot
+            (`IncidentMonitor.find_pushed`).
     """
     kind = incidents["kind"]
-    comes_near = cost.is_near & (incidents["robot_m_s"] > MOVING_M_S)
+    comes_near = cost.is_near & (incidents["robot_m_s"] > MOVING_M_S) & ~pushed
     too_hard = (kind == FLEEING) & (incidents["force_ratio"] > 1.0)
     return (comes_near | (kind == TOWARDS) | too_hard).any(1).astype(float)
 
 
-def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) -> dict[str, Floats]:
+def split_cost(
+    cost: Cost, incidents: Records2[Incident], pushed: Bools, config: CostConfig
+) -> dict[str, Floats]:
     """Return the components (B,) of a step's cost by name.
 
     Proximity and contact are always included.
@@ -115,12 +120,13 @@ def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) ->
     Args:
         cost: cost from separations.
         incidents: (B, W) incidents of the step.
+        pushed: (B, W) mask of the workers whose touch moves the robot.
         config: settings that select the components.
     """
     components = {"proximity": cost.proximity, "contact": cost.contact}
     for name in config.components:
         if name == "unsafe":
-            components[name] = find_unsafe(cost, incidents)
+            components[name] = find_unsafe(cost, incidents, pushed)
         elif name not in components:
             components[name] = _BY_INCIDENT[name](incidents)
     return components

@@ -27,15 +27,17 @@ from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
 from hrc_env.core.typing import (
+    Bools,
     Capsules,
     Floats,
     Ints,
     JointAngles,
+    JointVelocities,
     Points3,
     Vector3,
     Velocities3,
 )
-from hrc_env.geometry.chains import lever, link_frames
+from hrc_env.geometry.chains import capsules, lever, link_frames
 from hrc_env.geometry.distances import closest_parameters, least_separation
 from hrc_env.geometry.inertia import find_mobility
 from hrc_env.geometry.robot_model import RobotModel
@@ -586,7 +588,7 @@ def _find_greater(value: float, other: float) -> float:
 class IncidentMonitor(Stateful):
     """Detector of incidents, which stores the history of each worker over the steps."""
 
-    CHANGES = ("history", "recent")
+    CHANGES = ("history", "recent", "last_kind")
 
     def __init__(
         self,
@@ -611,12 +613,15 @@ class IncidentMonitor(Stateful):
         """Histories of the current episodes (B, W)."""
         self.recent = make_recent_motion(batch, n_robot, n_workers, len(capsule_names))
         """Motion in the last steps."""
+        self.last_kind = np.full((batch, n_workers), -1)
+        """Kind (B, W) of the last contact, as an index into `KINDS`; -1 before the first one."""
         self.regions, self.model, self.dt_s = find_regions(capsule_names), model, dt_s
 
     def reset(self, ids: Ints) -> None:
         """Begin new episodes in environments `ids`."""
         self.history[ids] = make_history(len(self.history[ids]), self.history.shape[1])
         self.recent.reset(ids)
+        self.last_kind[ids] = -1
 
     def step(self, world: World, paths: Paths) -> Records2[Incident]:
         """Detect and return the incidents (B, W) of a control step."""
@@ -624,9 +629,40 @@ class IncidentMonitor(Stateful):
         load_kg = np.zeros(len(self.history)) if objects is None else objects.held @ model.load_kg
         robots = TouchingRobots(model, world.robot.q, load_kg)
         stop_s = self.find_stop_time(world.robot)
-        return detect_incidents(
+        found = detect_incidents(
             self.history, self.recent, paths, self.regions, robots, stop_s, self.dt_s
         )
+        self.last_kind[:] = np.where(found["kind"] >= 0, found["kind"], self.last_kind)
+        return found
+
+    def find_pushed(self, world: World, paths: Paths, commands: JointVelocities) -> Bools:
+        """Return a mask (B, W) of the workers whose touch, not the command, moves the robot.
+
+        An arm that was pushed springs back. In a touch that began while the robot did not move
+        towards the worker, and for `CONTACT_GAP_S` afterwards, the robot counts as pushed unless
+        the commanded motion would reduce the separation by more than `MOVING_M_S`. Loads are
+        ignored.
+
+        Args:
+            world: state of the robots after the step.
+            paths: capsules of the bodies at the physics steps of the step.
+            commands: (B, N) commanded joint velocities in the step [rad/s], or [m/s] for slides.
+        """
+        was_hit = (self.history["since_s"] < CONTACT_GAP_S) & (self.last_kind != TOWARDS)
+        ids = np.flatnonzero(was_hit.any(1))
+        if not len(ids):
+            return was_hit
+        limit = self.model.fastest_rad_s
+        q, velocities = world.robot.q[ids], np.clip(np.nan_to_num(commands[ids]), -limit, limit)
+        ahead = np.stack([q, q + velocities * self.dt_s], axis=1)
+        arms_world = capsules(self.model.chain, ahead)
+        radius_m = paths.robot_radius_m[: arms_world.shape[2]]
+        workers_world = np.repeat(paths.workers_world[ids, -1:], 2, axis=1)
+        worker_radius_m = np.repeat(paths.worker_radius_m[ids, None], 2, axis=1)
+        gaps_m = least_separation(arms_world, radius_m, workers_world, worker_radius_m).distance_m
+        comes = (gaps_m[:, 0] - gaps_m[:, 1]) / self.dt_s > MOVING_M_S
+        was_hit[ids] &= ~comes
+        return was_hit
 
     def find_stop_time(self, robot: RobotState) -> Floats:
         """Return the stopping time (B,) of robots at their maximum deceleration [s]."""

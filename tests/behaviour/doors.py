@@ -659,8 +659,8 @@ def _put(config: dict[str, Any], path: str, value: Any) -> None:
 
 NOT_RECORDED = (
     "is_success", "proximity", "contacts_rated", "contacts_above_limit", "interventions",
-    "contacts_per_hour", "contacts_towards_per_hour", "contacts_fleeing_per_hour",
-    "contacts_standing_per_hour", "interventions_per_hour",
+    "approaches", "contact_steps", "contacts_per_hour", "contacts_towards_per_hour",
+    "contacts_fleeing_per_hour", "contacts_standing_per_hour", "interventions_per_hour",
 )  # fmt: skip
 """What curves, episodes and scores hold since the recordings were made."""
 

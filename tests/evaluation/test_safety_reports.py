@@ -13,6 +13,8 @@ from hrc_env.evaluation.episodes import play_episodes, summarize
 from hrc_env.evaluation.sums import (
     ABOVE,
     ACTIVE,
+    APPROACHES,
+    COMING,
     FORCE,
     INTERVENTIONS,
     RATED,
@@ -55,6 +57,21 @@ def test_a_new_episode_begins_without_interventions():
     info = {ACTIVE: np.array([1.0]), f"_{ACTIVE}": np.array([True])}
     sums.add(np.zeros(1), info)
     assert sums.sums[INTERVENTIONS].tolist() == [1.0]
+
+
+def test_an_approach_is_an_entry_of_a_robot_that_moves_towards_somebody():
+    near = [0.0, 1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 1.0]
+    towards_m_s = [0.9, 0.3, 0.9, 0.0, 0.04, 0.0, 0.06, -1.0]
+    sums = add_steps(**{"cost_proximity": near, COMING: towards_m_s, "cost_contact": near})
+    assert sums.sums[APPROACHES].tolist() == [2.0]
+    assert sums.sums["cost_contact"].tolist() == [5.0]
+    sums.begin(np.array([0]))
+    assert sums.sums[APPROACHES].tolist() == [0.0]
+
+
+def test_approaches_are_not_zero_but_unknown_without_speeds():
+    assert np.isnan(add_steps(**{"cost_proximity": [0.0, 1.0]}).sums[APPROACHES]).all()
+    assert np.isnan(add_steps(**{COMING: [0.0, 1.0]}).sums[APPROACHES]).all()
 
 
 def test_a_contact_is_severe_if_its_force_is_above_the_limit_of_the_region():

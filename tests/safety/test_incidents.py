@@ -8,9 +8,10 @@ from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import shapes
-from hrc_env.geometry.chains import SerialChain
+from hrc_env.geometry.chains import SerialChain, robot_state
 from hrc_env.geometry.inertia import LinkInertias
 from hrc_env.geometry.robot_model import RobotModel
+from hrc_env.motion import generator
 from hrc_env.motion.starts import measure_gap_m
 from hrc_env.safety import contact, incidents
 from hrc_env.safety.contact import clamping_force, contact_force
@@ -23,9 +24,10 @@ from hrc_env.safety.incidents import (
     make_recent_motion,
 )
 from hrc_env.settings import resolve_settings
-from hrc_env.simulation import Simulation
+from hrc_env.simulation import Simulation, worker_truth
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import load_body
+from hrc_env.world import World
 
 DT, T = 0.04, 5
 REGIONS = incidents.find_regions(["left_hand", "head"])
@@ -69,8 +71,9 @@ class Line:
         workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
         paths = incidents.measure_paths(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
         given = paths, REGIONS, self.robot, np.array([0.1]), DT
+        nobody = np.zeros((1, n), bool)
         found = detect_incidents(self.state, self.recent, *given)
-        self.is_unsafe = find_unsafe(measure_cost(paths.gaps_m, CostConfig()), found)[0]
+        self.is_unsafe = find_unsafe(measure_cost(paths.gaps_m, CostConfig()), found, nobody)[0]
         return found[0]
 
 
@@ -259,6 +262,81 @@ def test_a_step_is_unsafe_if_the_robot_endangers_somebody(gap_m, speeds, unsafe)
         line.step(*speed)
         found.append(line.is_unsafe)
     assert found == unsafe
+
+
+def standing(n_steps, batch=24, seed=0):
+    """A simulation in which robots stand beside people who ignore them, with its infos."""
+    known = {"perception": "none", "people": "unaware", "config": {"worker": "any"}}
+    simulation = Simulation(batch, resolve_settings(**known))
+    rngs = [np.random.default_rng(seed + b) for b in range(batch)]
+    simulation.reset(np.arange(batch), rngs)
+    for _ in range(n_steps):
+        yield simulation, simulation.step(np.zeros((batch, 6))).info
+
+
+def test_a_standing_robot_that_is_touched_costs_nothing_although_it_springs_back():
+    costs, touches, springs, kinds = 0.0, 0.0, 0.0, {}
+    for _, info in standing(200):
+        costs += info["cost"].sum()
+        touches += info["cost_contact"].sum()
+        near = info["cost_proximity"] > 0
+        springs += (near & (info["safety/robot_towards_m_s"] > incidents.MOVING_M_S)).sum()
+        kinds = {kind: info[f"safety/contacts_{kind}"].sum() for kind in KINDS}
+    assert costs == 0.0
+    assert touches > 20
+    assert springs > 5
+    assert kinds["standing"] > 1 > kinds["towards"]
+
+
+def test_whoever_is_touched_and_then_drives_on_is_not_pushed():
+    """By a command in one direction or in the other, of the fastest that there is."""
+    for simulation, info in standing(200):
+        monitor = simulation.monitor
+        touched = np.flatnonzero(info["cost_contact"])
+        if len(touched) and (monitor.last_kind[touched] == KINDS.index("standing")).all():
+            break
+    else:
+        pytest.fail("nobody was touched")
+    world = make_world(simulation)
+    nothing = np.zeros((24, 6))
+    assert monitor.find_pushed(*world, nothing)[touched].all()
+    found = []
+    for joint in range(6):
+        for sign in (-1.0, 1.0):
+            command = nothing.copy()
+            command[:, joint] = sign * 1e3  # limited to what an action can command
+            found.append(monitor.find_pushed(*world, command)[touched])
+    assert not np.all(found, axis=0).any()
+    assert np.any(found, axis=0).all()
+    assert monitor.find_pushed(*world, np.full((24, 6), np.nan))[touched].all()
+    monitor.last_kind[touched] = KINDS.index("towards")  # whoever drove in is not pushed
+    assert not monitor.find_pushed(*world, nothing)[touched].any()
+
+
+def make_world(simulation):
+    """The robots, and the bodies as they are now, as `find_pushed` takes them."""
+    truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
+    robot = robot_state(simulation.chain, simulation.physics.q, simulation.physics.qd)
+    paths = incidents.measure_paths(
+        robot.capsules_world[:, None], robot.capsule_radius_m, truth.capsules_world[:, None],
+        truth.capsule_radius_m,
+    )  # fmt: skip
+    return World(robot), paths
+
+
+def test_the_cost_of_a_step_is_an_indicator_and_the_former_sum_is_an_option():
+    agreed = {"components": ("proximity", "contact")}
+    _, (first, *infos) = played(200)
+    _, former = played(200, config={"cost": agreed})
+    assert "cost_unsafe" in first
+    assert "cost_unsafe" not in former[0]
+    cost = np.array([info["cost"] for info in infos])
+    assert np.unique(cost).tolist() == [0.0, 1.0]
+    for info, old in zip(infos, former[1:], strict=True):
+        assert (info["cost"] == info["cost_unsafe"]).all()
+        assert (info["cost"] <= info["cost_proximity"] + info["cost_contact"]).all()
+        assert (old["cost"] == info["cost_proximity"] + info["cost_contact"]).all()
+    assert max(old["cost"].max() for old in former) == 2.0
 
 
 def test_a_robot_that_leaves_a_near_worker_for_one_far_away_is_safe():

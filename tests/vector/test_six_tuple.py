@@ -27,7 +27,8 @@ def test_one_environment_gives_its_cost_beside_the_reward():
 
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
 def test_several_give_the_cost_of_an_episodes_last_step(mode):
-    config = {"cost": {"proximity_m": 50.0}}  # every step costs, no reset does
+    cost = {"proximity_m": 50.0, "components": ("proximity",)}  # every step costs, no reset does
+    config = {"cost": cost}
     env = CostVectorEnv(
         HRCVectorEnv(2, perception="none", autoreset_mode=mode, max_episode_steps=5, config=config)
     )
