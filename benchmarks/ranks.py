@@ -3,8 +3,8 @@
     python -m benchmarks ranks
 
 Twenty policies, listed in `POLICIES` before any number was seen, reach on the same seeds beside
-workers with the behaviour `unaware`. They are ranked by the mean cost of an episode, by contacts an hour in
-which the robot moves towards the worker, and by approaches an hour (steps in which the robot gets
+workers with the behaviour `unaware`. They are ranked by the mean cost of an episode, by contacts an
+hour in which the robot moves towards the worker, and by approaches an hour (steps in which it gets
 nearer than `CostConfig.proximity_m` at more than 0.05 m/s). Spearman's rank correlation has a 95 %
 bootstrap interval over seeds, which are resampled for all policies together; as resampling adds
 noise to both ranks, the interval is shifted towards 0. The former default of the cost, the sum of
