@@ -120,7 +120,7 @@ REPLAYS: dict[str, Replay] = {
     "learners": _replay_command("learners", learnt=(".policy_",)),
     "limited": _replay_command("limited", learnt=("",)),
     "kept": _replay_command("kept", row_words=3),
-    "budgets": _replay_command("budgets", row_words=3),
+    "budgets": _replay_command("budgets", row_words=2),
     "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(partial(_replay_price, "price"), row_words=2),
     "frontier": Replay(partial(_replay_price, "frontier"), row_words=2),
