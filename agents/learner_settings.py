@@ -145,5 +145,5 @@ COST_LIMITS: Mapping[str, float] = {
     "HRCDelivery-v0": 1.0,
 }
 """Budget of each built-in task, by id: the default of `--cost-limit`, the maximum mean cost of an
-episode [control steps]. `python -m benchmarks budgets` measures what it was chosen from.
+episode [control steps]. `python -m benchmarks budgets` measures the costs from which it was chosen.
 """

@@ -125,7 +125,7 @@ class PPOLagrangian(PPO):
         where they stopped before. Checkpoints do not contain them.
 
         Args:
-            env: environments that no one else steps, with `cost` in their infos; None: the
+            env: environments for this purpose alone, with `cost` in their infos; None: the
                 multiplier is updated from the cost of the exploring actions.
         """
         self._watched, self._watched_observation = env, None

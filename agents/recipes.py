@@ -28,7 +28,7 @@ def fill_in(arguments: TrainingRequest) -> Run:
     """Return the arguments, with those that are None replaced by the recipe of their task."""
     recipe = RECIPES.get(arguments.task, {})
     if arguments.algorithm == "ppo_lagrangian":
-        budget = {"cost_limit": COST_LIMITS.get(arguments.task)}
+        budget = {"cost_limit": COST_LIMITS.get(str(arguments.task))}
         ours = recipe if recipe.get("algorithm", "ppo") == "ppo" else {}
         recipe = {**ours, **LIMITED, **budget}
     elif arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):

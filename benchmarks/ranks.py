@@ -1,10 +1,10 @@
-"""Rank order of policies by the cost and by what the cost is to measure.
+"""Rank order of policies by the cost, by contacts and by approaches.
 
     python -m benchmarks ranks
 
 Twenty policies, listed in `POLICIES` before any number was seen, reach on the same seeds beside
-people who ignore the robot. They are ranked by the mean cost of an episode, by contacts an hour in
-which the robot moves towards the worker, and by approaches an hour (steps in which the robot gets
+workers with the behaviour `unaware`. They are ranked by the mean cost of an episode, by contacts an
+hour in which the robot moves towards the worker, and by approaches an hour (steps in which it gets
 nearer than `CostConfig.proximity_m` at more than 0.05 m/s). Spearman's rank correlation has a 95 %
 bootstrap interval over seeds, which are resampled for all policies together; as resampling adds
 noise to both ranks, the interval is shifted towards 0. The former default of the cost, the sum of
@@ -40,6 +40,7 @@ from hrc_env.experiments.report import (
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.stage import WORKER
 from hrc_env.experiments.study import FOUR, Played, Row, Study
+from hrc_env.observations import FLAT
 
 FIRST_SEED, TRIED_SEED = 18_310_000, 18_200_000
 """Seeds of the first episode of every policy, and of the episodes on which the benchmark was tried
@@ -65,7 +66,8 @@ class Standing:
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return actions (..., A) of zero."""
-        return np.zeros((*np.shape(observation)[:-1], self.n_actions), np.float32)
+        flat = observation[FLAT] if isinstance(observation, Mapping) else observation
+        return np.zeros((*flat.shape[:-1], self.n_actions), np.float32)
 
 
 def _widen(margin_m: float) -> dict[str, Any]:
@@ -247,7 +249,8 @@ def compute_spearman(a: Floats, b: Floats) -> Floats:
     """
     ranks = [stats.rankdata(each, axis=1) for each in (a, b)]
     x, y = (each - each.mean(1, keepdims=True) for each in ranks)
-    return (x * y).sum(1) / np.sqrt(np.square(x).sum(1) * np.square(y).sum(1))
+    with np.errstate(invalid="ignore"):
+        return (x * y).sum(1) / np.sqrt(np.square(x).sum(1) * np.square(y).sum(1))
 
 
 def find_greatest_spearman(values: Floats) -> Floats:

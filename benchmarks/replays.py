@@ -120,6 +120,7 @@ REPLAYS: dict[str, Replay] = {
     "limited": _replay_command("limited", learnt=("",)),
     "under_shield": _replay_command("under_shield", learnt=("",)),
     "kept": _replay_command("kept", row_words=3),
+    "budgets": _replay_command("budgets", row_words=2),
     "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(_replay_price, row_words=2),
 }

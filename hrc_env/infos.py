@@ -26,7 +26,7 @@ def cost_info(
     Args:
         cost: the cost of the step.
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.
-        pushed: mask (B, W) of the workers whose touch moves the robot.
+        pushed: mask (B, W) of the workers that push the robot by a touch.
         present: mask (B, W) of the workers that are in the scene.
         config: settings of the cost.
     """

@@ -83,13 +83,14 @@ class Train(TrainingRequest):
             )
 
 
-def _check_limit(limit: float | None, algorithm: str, task: str) -> None:
+def _check_limit(limit: float | None, algorithm: str, task: object) -> None:
     """Raise `ConfigError` for a cost limit that is not positive, missing or ignored."""
     from hrc_env.agents.learner_settings import COST_LIMITS  # here: it imports the agents
 
     has_limit = algorithm == "ppo_lagrangian"
     if limit is not None and not (math.isfinite(limit) and limit > 0):
-        budget = f"The default of {task} is {COST_LIMITS[task]:g}. " if task in COST_LIMITS else ""
+        default = COST_LIMITS.get(str(task))
+        budget = "" if default is None else f"The default of {task} is {default:g}. "
         raise ConfigError(
             f"--cost-limit must be above 0, got {limit:g}. {budget}A shield reduces the cost "
             "further."

@@ -101,7 +101,7 @@ def find_unsafe(cost: Cost, incidents: Records2[Incident], pushed: Bools) -> Flo
     Args:
         cost: cost from separations.
         incidents: (B, W) incidents of the step.
-        pushed: (B, W) mask of the workers whose touch moves the robot
+        pushed: (B, W) mask of the workers that push the robot by a touch
             (`IncidentMonitor.find_pushed`).
     """
     kind = incidents["kind"]
@@ -120,7 +120,7 @@ def split_cost(
     Args:
         cost: cost from separations.
         incidents: (B, W) incidents of the step.
-        pushed: (B, W) mask of the workers whose touch moves the robot.
+        pushed: (B, W) mask of the workers that push the robot by a touch.
         config: settings that select the components.
     """
     components = {"proximity": cost.proximity, "contact": cost.contact}

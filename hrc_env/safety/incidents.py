@@ -636,7 +636,7 @@ class IncidentMonitor(Stateful):
         return found
 
     def find_pushed(self, world: World, paths: Paths, commands: JointVelocities) -> Bools:
-        """Return a mask (B, W) of the workers whose touch, not the command, moves the robot.
+        """Return a mask (B, W) of the workers that push the robot by a touch.
 
         An arm that was pushed springs back. In a touch that began while the robot did not move
         towards the worker, and for `CONTACT_GAP_S` afterwards, the robot counts as pushed unless
