@@ -2595,9 +2595,9 @@ class Watched:
         numbers: Mapping[str, Any], step_s: float,
     ) -> None:  # fmt: skip
         """Begin episodes of a batch."""
-        model = _describe_robot(chain._made, numbers)
         self._make = partial(incidents.IncidentMonitor, batch, n_workers, capsule_names,
-                             model=model, dt_s=step_s)  # fmt: skip
+                             dt_s=step_s)  # fmt: skip
+        self._numbers = numbers
         self._watch: incidents.IncidentMonitor | None = None
         self._chain = chain._made
 
@@ -2612,7 +2612,13 @@ class Watched:
         held: NDArray[np.bool_],
     ) -> dict[str, NDArray[Any]]:  # fmt: skip
         """Return what happened while capsules (B, T, K, 2, 3), (B, T, W, L, 2, 3) went so."""
-        self._watch = self._watch or self._make(n_robot=robot.shape[2])
+        if self._watch is None:
+            n, of = robot.shape[2], self._chain
+            few = dataclasses.replace(
+                of, capsule_link=of.capsule_link[:n], capsule_ends=of.capsule_ends[:n],
+                capsule_radius_m=of.capsule_radius_m[:n],
+            )  # fmt: skip
+            self._watch = self._make(model=_describe_robot(few, self._numbers), n_robot=n)
         state = chains.robot_state(self._chain, np.zeros_like(qd), qd)
         nowhere, turn = np.zeros((*held.shape, 3)), np.zeros((*held.shape, 4))
         world = World(robot=state, objects=ObjectState(nowhere, turn, nowhere, nowhere, held))
