@@ -196,8 +196,8 @@ class AdversaryArguments(BenchArguments):
     """Search for reaches of a worker that lead to contacts, and count contacts with them.
 
     A cross-entropy search finds times, places and speeds of reaches for the scripted robot with the
-    shield qp and for one without a shield. On other seeds, such people are compared with people who
-    are unaware of the robot. The reaches that were found are written to reaches.json in the folder.
+    shield qp and for one without a shield. On other seeds, such people are compared with those
+    unaware of the robot. The reaches that were found are written to reaches.json in the folder.
     """
 
     out: Path = Path("out/bench_adversary")

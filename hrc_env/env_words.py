@@ -94,7 +94,7 @@ READERS: dict[str, Callable[[Any], Any]] = {
 }
 """Parsers of arguments that need special treatment, by name of the argument."""
 AGENTS_OWN = ("control",)
-"""Arguments whose default is determined by the agent."""
+"""Arguments with a default that the agent determines."""
 ON_THE_COMMAND_LINE = {
     "faults": "On the command line, each fault is a JSON object.",
     "cameras": "On the command line, a RigDistribution is a JSON object.",

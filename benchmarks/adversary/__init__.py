@@ -1,1 +1,1 @@
-"""The benchmark of people who reach where and when they are most likely to be touched."""
+"""The benchmark of people with reaches at places and times at which contacts are likely."""

@@ -1,11 +1,11 @@
-"""Contacts of the scripted robot with people whose reaches were searched for contacts.
+"""Contacts of the scripted robot with people with reaches that a search found.
 
 For each shield, the cross-entropy method (`benchmarks/adversary/cross_entropy.py`) searches for the
 times, targets and speeds of the reaches of a worker at the robot that lead to contacts while the
 robot moves towards the worker or, if there are none, to the shortest time to contact. The speeds
 and targets are within the ranges of other people (`hrc_env/motion/reaches.py`), and the script does
-not depend on the robot: the worker does not watch it. What the search finds is then compared with
-people who are unaware of the robot, on other seeds. Such searches for the worst people are also
+not depend on the robot: the worker does not watch it. The reaches that the search finds are then
+compared with those of people unaware of the robot, on other seeds. Such searches for the worst people are also
 called adaptive stress testing (Lee et al. 2020, arXiv:1811.02188).
 
 The folder then contains `reaches.json` with the distributions that were found and the worst episode

@@ -23,7 +23,7 @@ of an episode of `HRCReach-v0`."""
 
 
 def make_people(reaches: Script | ReachDistribution) -> PeopleConfig:
-    """Return people "unaware" of the robot who follow a script, or scripts of a distribution."""
+    """Return people "unaware" of the robot with a script, or scripts of a distribution."""
     return replace(PEOPLE["unaware"], reaches=reaches)
 
 

@@ -31,7 +31,7 @@ MIRROR: Ints = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13])
 """Index of the joint that corresponds to each joint on the opposite side of the body."""
 
 TORSO: Ints = np.array([1, 2, 7, 8])
-"""Indices of the shoulders and hips, whose mean is the root of the body."""
+"""Indices of the shoulders and hips; their mean is the root of the body."""
 
 BONES: Ints = np.array(
     [
@@ -41,7 +41,7 @@ BONES: Ints = np.array(
         (0, 1), (0, 2),
     ]
 )  # fmt: skip
-"""Pairs of joints whose distance is nearly constant."""
+"""Pairs of joints at a nearly constant distance."""
 
 BONE_LENGTH_M: Floats = np.array(
     [.34, .20, .55, .55, .28, .26, .28, .26, .37, .40, .20, .37, .40, .20, .28, .28]

@@ -98,7 +98,7 @@ class ArmPose:
 
 
 class KnownBodies(NamedTuple):
-    """Bodies whose surfaces are known instead of estimated, for upper bounds on performance."""
+    """Bodies with known instead of estimated surfaces, for upper bounds on performance."""
 
     capsules: BodyCapsules
     """Capsules of the bodies (B, W, S, ...)."""

@@ -18,7 +18,7 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 
 LOADS_CONSTANT = frozenset(dis.hasconst)
-"""Instructions whose argument is the index of a constant."""
+"""Instructions with the index of a constant as argument."""
 
 
 def digest_of(dispatcher: Dispatcher) -> str:

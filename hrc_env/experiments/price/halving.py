@@ -39,7 +39,7 @@ class Status(StrEnum):
     ESTIMATED = "estimated"
     """The estimate does not exceed the level, but the interval does."""
     MISSED = "missed"
-    """No setting was found whose estimate does not exceed the level."""
+    """No setting was found with an estimate up to the level."""
 
 
 @dataclass(frozen=True, slots=True)
