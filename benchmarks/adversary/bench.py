@@ -5,8 +5,8 @@ times, targets and speeds of the reaches of a worker at the robot that lead to c
 robot moves towards the worker or, if there are none, to the shortest time to contact. The speeds
 and targets are within the ranges of other people (`hrc_env/motion/reaches.py`), and the script does
 not depend on the robot: the worker does not watch it. The reaches that the search finds are then
-compared with those of people unaware of the robot, on other seeds. Such searches for the worst people are also
-called adaptive stress testing (Lee et al. 2020, arXiv:1811.02188).
+compared with those of people unaware of the robot, on other seeds. Such searches for the worst
+people are also called adaptive stress testing (Lee et al. 2020, arXiv:1811.02188).
 
 The folder then contains `reaches.json` with the distributions that were found and the worst episode
 of each search. The package plays those in `assets/adversary/reaches.json` for `people="adversary"`.
