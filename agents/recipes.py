@@ -26,7 +26,7 @@ LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}
 
 def fill_in(arguments: TrainingRequest) -> Run:
     """Return the arguments, with those that are None replaced by the recipe of their task."""
-    recipe = RECIPES.get(arguments.task, {})
+    recipe = RECIPES.get(str(arguments.task), {})
     if arguments.algorithm == "ppo_lagrangian":
         budget = {"cost_limit": COST_LIMITS.get(str(arguments.task))}
         ours = recipe if recipe.get("algorithm", "ppo") == "ppo" else {}

@@ -67,7 +67,7 @@ class Standing:
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return actions (..., A) of zero."""
         flat = observation[FLAT] if isinstance(observation, Mapping) else observation
-        return np.zeros((*flat.shape[:-1], self.n_actions), np.float32)
+        return np.zeros((*np.asarray(flat).shape[:-1], self.n_actions), np.float32)
 
 
 def _widen(margin_m: float) -> dict[str, Any]:
