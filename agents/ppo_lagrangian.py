@@ -118,7 +118,7 @@ class PPOLagrangian(PPO):
         own = ("_costs", "_beyond", "_watched", "_watched_observation")
         return [*super()._excluded_save_params(), *own]
 
-    def watch_mean_actions(self, env: VecEnv | None) -> None:
+    def watch_mean_actions(self, env: "VecEnv | None") -> None:
         """Update the multiplier from the cost of mean actions from the next rollout on.
 
         After each rollout, the policy acts for as many steps in these environments, which continue

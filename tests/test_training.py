@@ -119,7 +119,7 @@ def test_a_checkpoint_of_another_version_says_so(run, tmp_path):
 
 
 def test_a_checkpoint_for_another_environment_says_so(run):
-    with pytest.raises(CheckpointError, match=r"n_workers, control and observe_images"):
+    with pytest.raises(CheckpointError, match=r"n_workers, control, observe_images"):
         make_agent(str(run / "policy.zip"), here(n_workers=0))
 
 

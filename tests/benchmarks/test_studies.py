@@ -121,5 +121,5 @@ def test_what_is_learnt_is_judged_and_not_learnt_again(tmp_path, monkeypatch):
     learnt = found["HRCReach-v0.learnt.success"].value
     share = learnt / found["HRCReach-v0.scripted.success"].value
     assert found["HRCReach-v0.share_of_expert"].value == pytest.approx(share)
-    assert {"HRCReach-v0.minutes", "HRCReach-v0.learnt.contacts"} <= found.keys()
+    assert "HRCReach-v0.minutes" in found
     assert COMMANDS["learners"].is_release
