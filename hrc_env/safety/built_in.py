@@ -143,12 +143,7 @@ def limit_command(
     choose(found, wanted, allowed)
     limit(allowed)
     find_slack(found, allowed, slack)
-    unknown = belief.estimate.unknown | undetected.is_lost
-    values = {
-        "clearance_m": np.where(np.isinf(found.clearance_m), np.nan, found.clearance_m),
-        "slack": slack,
-        "unknown": unknown.any(1).astype(float),
-    }
+    values = _describe_limits(belief, undetected.is_lost, found.clearance_m, slack)
     return ShieldOutput(allowed, values)
 
 
@@ -187,13 +182,19 @@ def execute_verified(
     allowed = np.where(is_verified[:, None], wanted, brake(command, model, dt_s))
     limit(allowed)
     slack = found.excess_m_s if is_verified.all() else verify(allowed).excess_m_s
-    unknown = belief.estimate.unknown | undetected.is_lost
-    values = {
-        "clearance_m": np.where(np.isinf(found.gap_m), np.nan, found.gap_m),
-        "slack": slack,
-        "unknown": unknown.any(1).astype(float),
-    }
+    values = _describe_limits(belief, undetected.is_lost, found.gap_m, slack)
     return ShieldOutput(allowed, values)
+
+
+def _describe_limits(
+    belief: Belief, is_lost: Bools, clearance_m: Floats, slack: Floats
+) -> Mapping[str, Floats]:
+    """Return the reported values of `limit_command`."""
+    return {
+        "clearance_m": np.where(np.isinf(clearance_m), np.nan, clearance_m),
+        "slack": slack,
+        "unknown": (belief.estimate.unknown | is_lost).any(1).astype(float),
+    }
 
 
 def _is_near_unseen_floor(belief: Belief, sweep: Sweep, config: ShieldConfig) -> Bools:

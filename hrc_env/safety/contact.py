@@ -11,7 +11,7 @@ the limit is that of a quasi-static contact, half of the transient one. Only the
 modelled, not the force of a robot that keeps pressing.
 
 Shields and incidents take m_R from the robot's mass matrix (`geometry.inertia`). For a fixed-base
-robot, the standard has a rule that knows neither pose nor direction (`effective_mass`): m_R = M / 2
+robot, the standard has a rule without pose and direction (`effective_mass`): m_R = M / 2
 + m_L, with the mass M of its moving parts and that of its load.
 
 `BodyRegion.min_gap_m` is the gap that avoids the crushing of a part of the body (ISO 13854:2017,
