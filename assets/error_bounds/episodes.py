@@ -52,7 +52,7 @@ CONSTANT = ShieldConfig("qp", margin="constant")
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """What moves the robot, and what the cameras do, in the episodes of a sample."""
+    """Control of the robot and behaviour of the cameras in the episodes of a sample."""
 
     name: str
     """Description in tables."""

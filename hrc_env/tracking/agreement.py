@@ -1,8 +1,8 @@
 """Agreement of an estimate with the measurements of the last frames, joint by joint.
 
-A covariance says what an estimator expects of its error. How many views locate a joint, and how far
-their measurements are from it, show where it expects too little: a hidden wrist may be detected
-with confidence in the wrong place.
+A covariance is the error that an estimator expects. The number of views that locate a joint and the
+distance of their measurements from it reveal where this expectation is too small: a hidden wrist
+may be detected with confidence in the wrong place.
 """
 
 import math
