@@ -262,6 +262,7 @@ def build_constraints(
         high=high,
         clearance_m=np.empty(batch),
     )
+    params, bodies = _select_bodies(belief, pose, is_lost, config, known)
     robots = Robots(
         frames=pose.frames,
         slides=model.chain.slides,
@@ -271,10 +272,9 @@ def build_constraints(
         low=low,
         high=high,
         slew=model.slew_rad_s2,
-        inverse_mass=model.invert_mass_matrices(pose.frames, weigh_loads(belief, model)),
+        inverse_mass=_invert_mass_matrices(belief, pose, bodies.may_touch.any((1, 2))),
         obstacles=model.obstacles,
     )
-    params, bodies = _select_bodies(belief, pose, is_lost, config, known)
     floor = belief.unseen
     add_worker_constraints(robots, bodies, params, found)
     if floor is not None and np.isfinite(floor.possible_m).any():
@@ -282,6 +282,24 @@ def build_constraints(
         unseen = UnseenFloors(floor.floor_world, floor.level, floor.piece_m + HAND_M + walked_m)
         add_floor_constraints(robots, unseen, params, found)
     return found
+
+
+def _invert_mass_matrices(belief: Belief, pose: ArmPose, may_touch: Bools) -> Floats:
+    """Return the inverse mass matrices (B, N, N) of the robots that may touch a worker.
+
+    Constraints against other workers do not depend on them; those of other robots are NaN.
+
+    Args:
+        belief: the robot's knowledge of itself and of the workers.
+        pose: poses of the robots' links and capsules.
+        may_touch: (B,) mask of these robots.
+    """
+    model, n_joints = pose.model, pose.model.chain.n_joints
+    inverse = np.full((len(may_touch), n_joints, n_joints), np.nan)
+    if may_touch.any():
+        load_kg = weigh_loads(belief, model)[may_touch]
+        inverse[may_touch] = model.invert_mass_matrices(pose.frames[may_touch], load_kg)
+    return inverse
 
 
 def describe_bodies(

@@ -91,7 +91,8 @@ class Robots(NamedTuple):
     slew: Floats
     """Maximum rate of change of each joint velocity (N,) [rad/s^2]."""
     inverse_mass: Floats
-    """Inverse of the mass matrix (B, N, N), including loads [1 / (kg m^2); 1/kg for slides]."""
+    """Inverse of the mass matrix (B, N, N), including loads [1 / (kg m^2); 1/kg for slides]; read
+    only for robots that may touch a worker."""
     obstacles: Floats
     """Fixed shapes around the robot (G, `shapes.WIDTH`)."""
 
