@@ -132,6 +132,12 @@ class RecordingRequest(EnvironmentArguments):
     num_envs: int = 16
     """Number of parallel environments, and of episodes that are written together."""
 
+    def keywords(self) -> dict[str, Any]:
+        """Return the environment's keyword arguments, completed by those that the agent needs."""
+        from .registry import find_interface  # here: it imports the simulator
+
+        return find_interface(self.agent).complete(super().keywords())
+
 
 @dataclass(frozen=True)
 class ExportRequest:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import hrc_env
 from hrc_env.__main__ import main
 from hrc_env.agents import checkpoints, policies
 from hrc_env.agents.env_info import env_info
@@ -15,7 +16,12 @@ from hrc_env.agents.submission import read_submission
 from hrc_env.agents.training import read_arguments
 from hrc_env.core.errors import CheckpointError
 from hrc_env.env import HRCEnv
+from hrc_env.experiments.impact.episodes import play_row
+from hrc_env.experiments.impact.policies import Policy, choose_env_arguments, get_maker
 from hrc_env.experiments.leaderboard import make_plan
+from hrc_env.experiments.price.episodes import Driver, play_episodes
+from hrc_env.experiments.price.setups import find_setups
+from hrc_env.experiments.setups import PerceptionSetup
 
 TINY = ["--perception", "truth", "--num-envs", "4", "--threads", "1", "--no-film", "--seed", "3",
         "--episodes", "2"]  # fmt: skip
@@ -117,3 +123,31 @@ def test_what_is_given_takes_precedence():
 def test_what_cannot_be_learnt_is_refused_in_words(words, says, tmp_path, capsys):
     assert main(["train", *TINY, *words, "--timesteps", "64", "--out", str(tmp_path / "run")]) == 2
     assert says in " ".join(capsys.readouterr().err.split())
+
+
+def test_studies_make_the_environment_that_it_observes(exported, tmp_path):
+    """They refuse a policy whose observation differs from that of the environment."""
+    observed = {"config": {"forecast_s": (0.2, 0.4), "observe_shield": True}}
+    driver, shield = Driver(str(exported), control="tool"), hrc_env.ShieldConfig()
+    assert driver.env_arguments == {"control": "joint", **observed}
+    assert Driver("random", control="tool").env_arguments == {"control": "tool"}
+    (setup,) = find_setups(["truth"])
+    rows = play_episodes(setup, shield, "HRCReach-v0", 4, driver, [1], tick)
+    assert len(rows["cost"]) == 1
+    policy = Policy(driver.agent)
+    arguments = {"task": "HRCReach-v0", "shield": "qp", **choose_env_arguments(policy, None)}
+    maker = get_maker(policy, tmp_path / "none.zip")
+    rows = play_row(PerceptionSetup("truth"), arguments, [1], 4, maker, 0.0, tick)
+    assert {len(values) for values in rows.values()} == {1}
+
+
+def tick(share):
+    """Show no progress."""
+
+
+def test_its_episodes_are_recorded_with_what_it_observes(exported, tmp_path):
+    words = ["--agent", str(exported), "--perception", "truth", "--shield", "qp", "--episodes", "1"]
+    assert main(["record", *words, "--folder", str(tmp_path / "episodes")]) == 0
+    recorded = hrc_env.load_episodes(tmp_path / "episodes")
+    size = sum(term.entries for term in policies.read(exported).card.observation)
+    assert recorded[0].observations.shape[1] == size

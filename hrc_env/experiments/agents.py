@@ -8,7 +8,14 @@ from typing import Any
 
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import AgentFactory
-from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, find_function, make_agent
+from hrc_env.agents.registry import (
+    AGENTS,
+    OTHERS,
+    check_agent,
+    find_function,
+    find_interface,
+    make_agent,
+)
 from hrc_env.agents.separate import SeparateProcess
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.experiments.versions import hash_file, hash_source
@@ -32,6 +39,19 @@ def check_choice(agent: AgentChoice) -> None:
 def get_agent_factory(agent: AgentChoice, trust: bool = False) -> AgentFactory:
     """Return the function that makes an agent for an `EnvInfo`."""
     return partial(make_agent, agent, trust=trust) if isinstance(agent, str) else agent
+
+
+def find_env_arguments(agent: str, control: str | None) -> dict[str, Any]:
+    """Return the environment's keyword arguments on which an agent's interface depends.
+
+    They are the control mode and the optional terms of the observation with which it was trained.
+
+    Args:
+        agent: the agent as `hrc_env.make_agent` accepts it.
+        control: control mode if the agent's file does not name one; None: the default.
+    """
+    default = {} if control is None else {"control": control}
+    return default | find_interface(agent).complete({})
 
 
 def describe_agent(agent: AgentChoice) -> Any:

@@ -15,6 +15,7 @@ from gymnasium.utils import seeding
 from hrc_env.control import check_action
 from hrc_env.core.infos import Info
 from hrc_env.core.machine import n_cores
+from hrc_env.core.mapping import merge
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.rigs import Turn
@@ -73,11 +74,13 @@ class Stage:
 
     def _get_env(self, k: int, turn: Turn, n_episodes: int) -> Shards:
         if (k, n_episodes) not in self._envs:
-            settings = resolve_settings(
-                perception=self.setup.level, estimator=self.setup.estimator, people=PEOPLE,
-                faults=list(turn.faults), cameras=list(turn.cameras), config={"worker": WORKER},
+            config = merge(self.made_with.get("config", {}), {"worker": WORKER})
+            settings = resolve_settings(**{
                 **self.made_with,
-            )  # fmt: skip
+                "perception": self.setup.level, "estimator": self.setup.estimator,
+                "people": PEOPLE, "faults": list(turn.faults), "cameras": list(turn.cameras),
+                "config": config,
+            })  # fmt: skip
             threads = 1 if self.setup.level == "pixels" else min(n_cores(), n_episodes)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # a rig of one camera is intended here

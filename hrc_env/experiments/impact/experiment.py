@@ -21,7 +21,7 @@ from hrc_env.experiments.impact.policies import (
     SLOWED,
     WORDS,
     Policy,
-    choose_control,
+    choose_env_arguments,
     describe_policy,
     get_maker,
     train_once,
@@ -192,9 +192,8 @@ class Impact:
         self, setup: PerceptionSetup, policy: Policy, checkpoint: Path, ppo: str
     ) -> list[Part]:
         """Return the parts of a row; each has at most `N_TOGETHER` episodes."""
-        control = choose_control(policy, self.control)
-        env_arguments: dict[str, Any] = {"task": self.task, "shield": self.shield}
-        env_arguments |= {} if control is None else {"control": control}
+        interface = choose_env_arguments(policy, self.control)
+        env_arguments = {"task": self.task, "shield": self.shield, **interface}
         seeds, name = self.list_seeds(setup.level), f"{policy.label}.{setup.name}"
         shards = [seeds[k : k + N_TOGETHER] for k in range(0, len(seeds), N_TOGETHER)]
         return [
@@ -204,7 +203,7 @@ class Impact:
                     _play, policy.label, setup, env_arguments, shard, self.n_steps,
                     get_maker(policy, checkpoint, self.trust), policy.margin_m,
                 ),
-                self._make_key(setup, control, policy, ppo, shard),
+                self._make_key(setup, interface, policy, ppo, shard),
             )
             for shard in shards
         ]  # fmt: skip
@@ -212,7 +211,7 @@ class Impact:
     def _make_key(
         self,
         setup: PerceptionSetup,
-        control: str | None,
+        interface: Mapping[str, Any],
         policy: Policy,
         ppo: str,
         seeds: Sequence[int],
@@ -223,7 +222,7 @@ class Impact:
             "worker": WORKER,
             "task": self.task,
             **({} if self.shield is None else {"shield": self.shield}),
-            **({} if control is None else {"control": control}),
+            **interface,
             "seeds": list(seeds),
             "n_steps": self.n_steps,
             "setup": asdict(setup),

@@ -9,11 +9,11 @@ from typing import Any
 
 from hrc_env.agents.env_info import Agent, env_info
 from hrc_env.agents.experts import make_expert
-from hrc_env.agents.registry import find_control, make_agent
+from hrc_env.agents.registry import make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
 from hrc_env.engines.files import carried
-from hrc_env.experiments.agents import describe_agent, label_agent
+from hrc_env.experiments.agents import describe_agent, find_env_arguments, label_agent
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
 from hrc_env.experiments.stage import PEOPLE, WORKER
@@ -69,11 +69,14 @@ def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
     return settings | own
 
 
-def choose_control(policy: Policy, control: str | None) -> str | None:
-    """Return the control mode of a policy: that of its file, or otherwise the requested one."""
-    if policy.name == PPO:
-        return None
-    return control if policy.name in POLICIES else find_control(policy.name) or control
+def choose_env_arguments(policy: Policy, control: str | None) -> dict[str, Any]:
+    """Return the arguments of the environment that set a policy's control mode and observation.
+
+    Args:
+        policy: the policy.
+        control: control mode if the policy's file does not name one; None: the default.
+    """
+    return {} if policy.name == PPO else find_env_arguments(policy.name, control)
 
 
 def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.registry import find_control, make_agent
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.evaluation.sums import ABOVE, ACTIVE, FORCE, INTERVENTIONS, RATED, SEVERITY
-from hrc_env.experiments.agents import describe_agent
+from hrc_env.experiments.agents import describe_agent, find_env_arguments
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.price.setups import PriceSetup
 from hrc_env.experiments.price.true_bodies import TrueBodyShield
@@ -67,9 +67,8 @@ class Driver:
 
     @property
     def env_arguments(self) -> dict[str, Any]:
-        """Arguments of the environment that set the control mode."""
-        control = find_control(self.agent) or self.control
-        return {} if control is None else {"control": control}
+        """Arguments of the environment: control mode and observation of the agent."""
+        return find_env_arguments(self.agent, self.control)
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of the agent on which episodes depend, as JSON values.
