@@ -87,16 +87,18 @@ def compile_kernels(console: Console, level: str | None = None, is_verbose: bool
 
     Args:
         console: console for messages.
-        level: perception level; None for all levels.
+        level: perception level of which the kernels are compiled that the first steps need; None
+            for all kernels of all levels.
         is_verbose: whether success is reported.
     """
     from hrc_env.core.kernels import ahead
     from hrc_env.core.kernels.cache import folder
 
-    if n_missing := len(ahead.missing(level)):
+    wanted = None if level is None else level + ahead.FIRST
+    if n_missing := len(ahead.missing(wanted)):
         console.print(f"Compiling {n_missing} kernels for this machine, once ...")
         with progress_bar(console, "kernels") as say:
-            ahead.compile_missing(level, say)
+            ahead.compile_missing(wanted, say)
     if is_verbose:
         console.print(f"[green]ok[/] kernels: compiled, in {folder()}")
 

@@ -12,16 +12,23 @@ unchanged. The base classes are internals of numba: releases other than the test
 # The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
+import contextlib
 import copy
-from collections.abc import Callable, Iterator
+import gc
+from collections.abc import Callable, Generator, Iterator
 from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import codegen, cpu, registry
+from numba.core import codegen, compiler, cpu, registry, types, typing
+from numba.extending import lower_cast, overload
+from numba.np import arrayobj
 
 from hrc_env.core.kernels.cache import KernelCache
+
+RARELY = (100_000, 50, 1_000)
+"""Thresholds of the garbage collector (`gc.set_threshold`) while kernels are compiled."""
 
 
 class LeanLibrary(codegen.JITCodeLibrary):
@@ -56,6 +63,11 @@ class LeanLibrary(codegen.JITCodeLibrary):
         """Do nothing: the kernel that Python calls is optimised as a whole."""
         ll_module.data_layout = self._codegen._data_layout
 
+    def _optimize_final_module(self) -> None:
+        """Optimise once; numba's cheaper passes before that do not make kernels faster."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+
     def finalize(self) -> None:
         """Link all callees, from callers to callees, optimise and emit."""
         self._codegen._check_llvm_bugs()
@@ -86,6 +98,41 @@ class LeanLibrary(codegen.JITCodeLibrary):
         return reversed(order[:-1])
 
 
+@contextlib.contextmanager
+def rare_collections() -> Generator[None]:
+    """Collect garbage rarely in a context; collections take a fifth of the time of the compiler."""
+    usual = gc.get_threshold()
+    gc.set_threshold(*RARELY)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+def _complain_of_shapes(source: Any, target: Any) -> None:
+    """Raise `ValueError` because an array does not fit into a slice."""
+
+
+@overload(_complain_of_shapes)
+def _overload_complaint(source: Any, target: Any) -> Any:
+    def complain(source: Any, target: Any) -> None:
+        raise ValueError("cannot assign slice from input of different size")
+
+    return complain
+
+
+class LeanTyping(typing.Context):
+    """Typing context of numba in which assignments to slices have a constant error message.
+
+    numba's message, which contains the shapes, takes a tenth of the compile time.
+    """
+
+    def resolve_value_type(self, val: Any) -> Any:
+        """Return the type of a global value."""
+        is_complaint = val is arrayobj.raise_with_shape_context
+        return super().resolve_value_type(_complain_of_shapes if is_complaint else val)
+
+
 class LeanContext(cpu.CPUContext):
     """CPU context of numba that compiles libraries as described above."""
 
@@ -107,6 +154,8 @@ def _lean_context() -> LeanContext:
     context = LeanContext.__new__(LeanContext)
     context.__dict__.update(usual.__dict__)
     context._internal_codegen = generator
+    context.typing_context = LeanTyping.__new__(LeanTyping)
+    context.typing_context.__dict__.update(usual.typing_context.__dict__)
     context.cached_internal_func = {}  # numba's own functions must not use callees
     return context
 
@@ -118,10 +167,50 @@ class LeanTarget(registry.CPUTarget):
     typing_context: Any = property(lambda self: registry.cpu_target.typing_context)  # type: ignore[override]
 
 
+class LeanFlags(compiler.Flags):
+    """Options of a compilation, which numba compares often, and whose comparison is slow."""
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the same options are set to the same values."""
+        return isinstance(other, LeanFlags) and self._values == other._values
+
+    def __hash__(self) -> int:
+        """Return the hash of the names of the set options."""
+        return hash(frozenset(self._values))
+
+
 class CalleeDispatcher(registry.CPUDispatcher):
     """Dispatcher of a kernel that is called by other kernels."""
 
     targetdescr = LeanTarget("cpu")
+
+    def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, targetoptions=targetoptions)
+        self._compiler._customize_flags = LeanFlags
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return the signature of a call, with generalised types of its arguments."""
+        named = {name: _generalise(each) for name, each in dict(kws).items()}
+        return super().get_call_template(tuple(map(_generalise, args)), named)
+
+
+def _generalise(kind: Any) -> Any:
+    """Return the type of a parameter that takes arguments of a type.
+
+    Constants are passed as variables, and the arrays in a record as arrays of any shape. numba
+    would compile a callee again for each constant, and for arrays that are in a record.
+    """
+    if isinstance(kind, types.NestedArray):
+        return types.Array(kind.dtype, kind.ndim, kind.layout)
+    return types.unliteral(kind)
+
+
+@lower_cast(types.NestedArray, types.Array)
+def _pass_nested_array(
+    context: Any, builder: Any, source: Any, target: Any, value: Any
+) -> Any:  # pragma: no cover
+    """Pass an array in a record as an array; both have the same structure."""
+    return value
 
 
 class KernelDispatcher(registry.CPUDispatcher):
@@ -134,7 +223,13 @@ class KernelDispatcher(registry.CPUDispatcher):
         self.callee = CalleeDispatcher(
             py_func, targetoptions={**targetoptions, "no_cpython_wrapper": True}
         )
+        self._compiler._customize_flags = LeanFlags
         self._cache: Any = KernelCache(self)
+
+    def compile(self, sig: Any) -> Any:
+        """Load or compile the kernel for a signature, and return what Python calls."""
+        with rare_collections():
+            return super().compile(sig)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the signature with which another kernel calls this one."""

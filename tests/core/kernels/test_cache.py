@@ -1,11 +1,16 @@
-"""Compiled kernels lie beside the package or where the user may write, and always fit."""
+"""Compiled kernels lie in the user's cache or where the user may write, and always fit."""
 
+import errno
+import logging
+import os
 import shutil
+import time
 from pathlib import Path
 
 import pytest
 
-from hrc_env.core.kernels import cache
+from hrc_env.core.folders import temporary_cache
+from hrc_env.core.kernels import cache, kernel
 
 PACKAGE = cache.PACKAGE
 KERNEL = "hrc_env.observations:_scale"
@@ -31,9 +36,9 @@ def tree(tmp_path) -> Path:
 def was_compiled(process):
     """Whether a tree's kernel lay on disk; it does from then on."""
 
-    def asked(tree: Path) -> bool:
+    def asked(tree: Path, cache: str = "") -> bool:
         words = "-c", COMPILE.format(KERNEL)
-        cache = str(tree / "cache")
+        cache = cache or str(tree / "cache")
         done = process(
             *words, cwd=tree, NUMBA_CACHE_DIR=None, PYTHONPATH=str(tree), XDG_CACHE_HOME=cache
         )
@@ -43,6 +48,14 @@ def was_compiled(process):
         return told[0] == "True"
 
     return asked
+
+
+def test_checkouts_of_equal_sources_share_what_is_compiled(tree, was_compiled, tmp_path):
+    copy = tree.with_name("second")
+    shutil.copytree(tree, copy)
+    home = str(tmp_path / "home")
+    assert not was_compiled(tree, home)
+    assert was_compiled(copy, home)
 
 
 def test_a_copied_and_edited_tree_keeps_the_kernels_that_still_fit(tree, was_compiled):
@@ -61,51 +74,120 @@ def edit(path: Path, before: str, after: str) -> None:
     path.write_text(source.replace(before, after))
 
 
-@pytest.mark.parametrize(("chosen", "n_kept"), [("", 1), ("a folder of several checkouts", 2)])
-def test_an_older_form_of_a_kernel_goes_but_from_a_chosen_folder(
-    tmp_path, monkeypatch, chosen, n_kept
-):
-    from hrc_env.core.kernels import kernel
+def make_kernel(constant: float = 1.0):
+    scope = {"kernel": kernel, "__name__": __name__, "C": constant}
+    exec("@kernel\ndef grow(x):\n    return x + C", scope)
+    return scope["grow"]
 
-    monkeypatch.setenv("NUMBA_CACHE_DIR", chosen)
+
+def test_the_forms_of_several_checkouts_lie_side_by_side(tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "folder", lambda: tmp_path)
-    for constant in (1.0, 2.0):
-        scope = {"kernel": kernel, "__name__": __name__, "C": constant}
-        exec("@kernel\ndef grow(x):\n    return x + C", scope)
-        assert scope["grow"](1.0) == 1.0 + constant
-    assert len(list(tmp_path.glob("*grow*"))) == n_kept
+    assert [make_kernel(constant)(1.0) for constant in (1.0, 2.0)] == [2.0, 3.0]
+    assert len(list(tmp_path.glob("*grow*"))) == 2
 
 
-def test_where_the_package_cannot_be_written_kernels_go_to_the_users_cache(tmp_path, monkeypatch):
+def test_files_that_were_not_used_for_longest_are_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
+    monkeypatch.setattr(cache, "MAX_BYTES", 2500)
+    for days, name in ((3, "old"), (2, "used"), (1, "new")):
+        (tmp_path / f"{name}{cache.SUFFIX}").write_bytes(bytes(1000))
+        os.utime(tmp_path / f"{name}{cache.SUFFIX}", (time.time() - 86_400 * days,) * 2)
+    (tmp_path / "not ours.txt").write_bytes(bytes(5000))
+    cache._note_use(tmp_path / f"used{cache.SUFFIX}")
+    cache._limit_size.cache_clear()
+    cache._limit_size(tmp_path)
+    assert {each.stem for each in tmp_path.iterdir()} == {"used", "new", "not ours"}
+
+
+@pytest.mark.parametrize("setting", ["NUMBA_BOUNDSCHECK", "NUMBA_DEBUGINFO"])
+def test_other_settings_of_the_compiler_find_other_files(setting, process, tmp_path):
+    code = COMPILE.format(KERNEL)
+    for value, was_there in (("0", "False"), ("1", "False"), ("1", "True"), ("0", "True")):
+        done = process("-c", code, NUMBA_CACHE_DIR=str(tmp_path), **{setting: value})
+        assert done.stdout.split() == [was_there, "True"], done.stderr
+
+
+@pytest.fixture
+def unwritable(tmp_path) -> Path:
+    """A path in a file, where nobody, root included, makes a folder."""
+    (tmp_path / "file").touch()
+    return tmp_path / "file"
+
+
+@pytest.fixture
+def find_folder(monkeypatch):
+    """The folder of kernels for a user's cache and a package in these places."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
-    file = tmp_path / "file"
-    file.touch()  # nobody, root included, makes a folder in a file
-    monkeypatch.setattr(cache, "PACKAGE", file / "hrc_env")
-    cache.folder.cache_clear()
-    try:
-        assert cache.folder().parent == tmp_path / "home" / "hrc_env"
-    finally:
+
+    def find(home: Path, package: Path) -> Path:
+        monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+        monkeypatch.setattr(cache, "PACKAGE", package)
         cache.folder.cache_clear()
+        return cache.folder()
+
+    yield find
+    cache.folder.cache_clear()
 
 
-def test_where_nothing_can_be_written_kernels_work_all_the_same(tmp_path, monkeypatch):
-    from hrc_env.core.kernels import kernel
+def test_kernels_go_to_the_users_cache_or_where_files_can_be_written(
+    find_folder, tmp_path, unwritable
+):
+    package = tmp_path / "package"
+    assert find_folder(tmp_path, package) == tmp_path / "hrc_env" / "kernels"
+    assert find_folder(unwritable, package) == package / "__pycache__" / "kernels"
+    assert find_folder(unwritable, unwritable) == temporary_cache() / "kernels"
 
-    file = tmp_path / "file"
-    file.touch()
-    monkeypatch.setattr(cache, "folder", lambda: file / "kernels")
-    assert kernel(lambda x: x + 1.0)(1.0) == 2.0
+
+def test_kernels_in_a_folder_that_is_only_read_are_used(find_folder, tmp_path, unwritable):
+    """As in a distribution that contains them: the folder beside the package is looked at, too."""
+    package = tmp_path / "package"
+    find_folder(unwritable, package)
+    assert make_kernel(5.0)(1.0) == 6.0
+    (kept,) = (package / "__pycache__" / "kernels").glob("*grow*")
+    find_folder(tmp_path, package)
+    again = make_kernel(5.0)
+    assert again(1.0) == 6.0
+    assert sum(again.stats.cache_hits.values()) == 1
+    assert not list((tmp_path / "hrc_env" / "kernels").glob("*grow*"))
+    assert kept.exists()
 
 
-def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch):
-    from hrc_env.core.kernels import kernel
+@pytest.mark.parametrize("error", [errno.ENOSPC, errno.EROFS])
+def test_where_nothing_can_be_saved_kernels_work_and_a_warning_says_why(
+    tmp_path, monkeypatch, caplog, error
+):
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "kernels")
 
+    def refuse(path, content):
+        path.touch()
+        raise OSError(error, os.strerror(error))
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    cache._warn_unsaved.cache_clear()
+    with caplog.at_level(logging.WARNING):
+        assert [make_kernel(constant)(1.0) for constant in (7.0, 8.0)] == [8.0, 9.0]
+    assert caplog.text.count("cannot be saved") == 1
+    assert os.strerror(error) in caplog.text
+    assert not list(tmp_path.rglob("*.tmp"))
+
+
+@pytest.mark.parametrize("damage", [
+    lambda form: form[:100],
+    lambda form: b"",
+    lambda form: form[:-1],
+    lambda form: form[:5000] + bytes([form[5000] ^ 1]) + form[5001:],
+    lambda form: form[32:],
+])  # fmt: skip
+def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch, damage):
+    """Damaged code would end the process, or compute something else."""
     monkeypatch.setattr(cache, "folder", lambda: tmp_path)
-    source = "@kernel\ndef grow(x):\n    return x + 1.0"
-    for _ in range(2):
-        scope = {"kernel": kernel, "__name__": __name__}
-        exec(source, scope)
-        assert scope["grow"](1.0) == 2.0
-        (kept,) = tmp_path.glob("*grow*")
-        kept.write_bytes(kept.read_bytes()[:100])
+    assert make_kernel(9.0)(1.0) == 10.0
+    (kept,) = tmp_path.glob("*grow*")
+    whole = kept.read_bytes()
+    kept.write_bytes(damage(whole))
+    again = make_kernel(9.0)
+    assert again(1.0) == 10.0
+    assert sum(again.stats.cache_hits.values()) == 0
+    third = make_kernel(9.0)
+    assert third(1.0) == 10.0
+    assert sum(third.stats.cache_hits.values()) == 1

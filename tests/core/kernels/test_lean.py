@@ -1,5 +1,7 @@
 """Kernels give what Python gives; callees are part of them; others' functions are left alone."""
 
+import gc
+
 import numba
 import numpy as np
 import pytest
@@ -84,3 +86,45 @@ def test_functions_that_others_compile_with_numba_are_compiled_as_ever():
     assert theirs(2.0) == 4.0
     (compiled,) = theirs.overloads.values()
     assert type(compiled.library) is JITCodeLibrary
+
+
+HOLDER = np.dtype([("inside", float, (2, 3))])
+
+
+@kernel
+def add_entry(values, k):
+    return values[0, k] + k
+
+
+@kernel
+def call_with_constants(records, values, k):
+    inside = records[0].inside
+    return add_entry(values, 0) + add_entry(values, 1) + add_entry(values, k) + add_entry(inside, 2)
+
+
+def test_a_callee_is_compiled_once_for_constants_and_arrays_in_records():
+    records, values = np.zeros(1, HOLDER), np.arange(6.0).reshape(2, 3)
+    records["inside"] = 10.0
+    assert call_with_constants(records, values, 2) == 0.0 + 2.0 + 4.0 + 12.0
+    assert len(add_entry.callee.signatures) == 1
+
+
+@kernel(makes_arrays=True)
+def write_rows(target, source):
+    target[1:] = source
+
+
+def test_arrays_that_do_not_fit_into_a_slice_are_refused():
+    target = np.zeros((3, 2))
+    write_rows(target, np.ones((2, 2)))
+    write_rows(target, np.full((1, 2), 5.0))
+    np.testing.assert_array_equal(target, [[0, 0], [5, 5], [5, 5]])
+    with pytest.raises(ValueError, match="cannot assign slice from input of different size"):
+        write_rows(target, np.ones((3, 2)))
+
+
+def test_garbage_is_collected_as_usual_after_a_compilation():
+    before = gc.get_threshold()
+    with pytest.raises(numba.TypingError):
+        kernel(lambda x: x.no_such_attribute)(1.0)
+    assert gc.get_threshold() == before
