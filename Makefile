@@ -6,6 +6,7 @@
 # make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
 # make docs         the site, in out/docs
+# make wheel        wheels for PyPI: of pure Python, and with compiled kernels
 # make results      all numbers and pictures of the documentation made at older versions (hours)
 # make behaviour    whether anything behaves otherwise than recorded
 # make check        style, types, floors, language
@@ -21,7 +22,7 @@ DOCS := $(VENV)/.docs
 DEV := $(VENV)/.dev
 PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-all test-stock test-ray test-long behaviour check bench train-quick docs results clean
+.PHONY: demo test test-all test-stock test-ray test-long behaviour check bench train-quick docs wheel results clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
@@ -46,6 +47,9 @@ $(DOCS): pyproject.toml constraints.txt
 
 docs: $(DOCS)
 	$(RUN) -m docs.site
+
+wheel: $(DEV)
+	$(RUN) -m assets.kernels.wheel
 
 demo: $(CORE)
 	$(RUN) -m hrc_env demo

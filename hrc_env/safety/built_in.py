@@ -272,7 +272,7 @@ def build_constraints(
         low=low,
         high=high,
         slew=model.slew_rad_s2,
-        inverse_mass=_invert_mass_matrices(belief, pose, bodies.may_touch.any((1, 2))),
+        inverse_mass=_invert_mass_matrices(belief, pose, bodies),
         obstacles=model.obstacles,
     )
     floor = belief.unseen
@@ -284,17 +284,18 @@ def build_constraints(
     return found
 
 
-def _invert_mass_matrices(belief: Belief, pose: ArmPose, may_touch: Bools) -> Floats:
+def _invert_mass_matrices(belief: Belief, pose: ArmPose, bodies: Bodies) -> Floats:
     """Return the inverse mass matrices (B, N, N) of the robots that may touch a worker.
 
-    Constraints against other workers do not depend on them; those of other robots are NaN.
+    Those of other robots are NaN; their constraints do not depend on them.
 
     Args:
         belief: the robot's knowledge of itself and of the workers.
         pose: poses of the robots' links and capsules.
-        may_touch: (B,) mask of these robots.
+        bodies: the estimated bodies, with the segments that may be touched.
     """
     model, n_joints = pose.model, pose.model.chain.n_joints
+    may_touch = np.asarray(bodies.may_touch.any((1, 2)))
     inverse = np.full((len(may_touch), n_joints, n_joints), np.nan)
     if may_touch.any():
         load_kg = weigh_loads(belief, model)[may_touch]

@@ -82,7 +82,7 @@ def dispatcher(version: str) -> Any:
     if not tested:
         warnings.warn(
             f"{UNTESTED} {version}, but with {', '.join(LEAN_WITH)}: numba's default compiler is "
-            "used, which makes the first compilation about twice as slow.",
+            "used, which compiles several times more slowly.",
             stacklevel=2,
         )
     name = "lean" if tested else "plain"

@@ -35,7 +35,8 @@ from hrc_env.core import folders
 from hrc_env.core.kernels.digest import digest_of
 
 log = logging.getLogger("hrc_env.core.kernels")
-PACKAGE = Path(__file__).resolve().parents[2]
+DISTRIBUTED = Path(__file__).resolve().with_name("compiled")
+"""Folder of the kernels that a wheel may contain (`python -m assets.kernels.wheel`)."""
 SUFFIX = ".nbc"
 OPTIONS = ("BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "OPT", "SLP_VECTORIZE")
 """Names of numba's settings that change compiled code."""
@@ -51,25 +52,20 @@ _DIGEST_BYTES = hashlib.sha256().digest_size
 def folder() -> Path:
     """Return the folder in which compiled kernels are saved.
 
-    It is NUMBA_CACHE_DIR if that is set; otherwise the first of `_list_usual_folders` in which
-    files can be written, or a temporary folder.
+    It is NUMBA_CACHE_DIR if that is set, and otherwise `kernels` in the user's cache.
     """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
-    if chosen:
-        return Path(chosen) / "hrc_env"
-    writable = filter(folders.can_write, _list_usual_folders())
-    return next(writable, folders.temporary_cache() / "kernels")
+    return Path(chosen) / "hrc_env" if chosen else folders.user_cache() / "kernels"
 
 
-def _list_usual_folders() -> list[Path]:
-    """Return the folders in which compiled kernels may be found.
+def list_read_only() -> list[Path]:
+    """Return other folders in which compiled kernels may be found.
 
-    They are one in the user's cache and one beside the package's bytecode, which may be part of a
-    distribution.
+    They are `DISTRIBUTED` and a user's cache that cannot be written. If NUMBA_CACHE_DIR is set, it
+    takes the place of the latter.
     """
-    usual = folders.usual_cache()
-    shared = [] if usual is None else [usual / "kernels"]
-    return [*shared, PACKAGE / "__pycache__" / "kernels"]
+    usual = None if os.environ.get("NUMBA_CACHE_DIR") else folders.usual_cache()
+    return [DISTRIBUTED] if usual is None else [usual / "kernels", DISTRIBUTED]
 
 
 def _hashed(text: str) -> str:
@@ -92,8 +88,8 @@ class KernelCache(NullCache):
         function = self._dispatcher.py_func
         name = f"{function.__module__.removeprefix('hrc_env.')}.{function.__qualname__}"
         file = f"{name}-{kind}-{made_of}{SUFFIX}"
-        others = [] if os.environ.get("NUMBA_CACHE_DIR") else _list_usual_folders()
-        found = (each / file for each in (folder(), *others) if (each / file).exists())
+        places = (each / file for each in (folder(), *list_read_only()))
+        found = (each for each in places if each.exists())
         return next(found, folder() / file)
 
     def load_overload(  # type: ignore[override]

@@ -21,12 +21,18 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from numba import _dynfunc  # type: ignore[attr-defined]
-from numba.core import codegen, compiler, cpu, registry, types, typing
+from numba.core import codegen, compiler, config, cpu, registry, types
+from numba.core.typing.context import Context
 from numba.extending import lower_cast, overload
 from numba.np import arrayobj
 
 from hrc_env.core.kernels.cache import KernelCache
 
+PORTABLE_FEATURES = (
+    "sse4.2", "popcnt", "cx16", "sahf",
+    "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe",
+)  # fmt: skip
+"""LLVM's names of the features of x86-64-v3, besides those of all x86-64 processors."""
 RARELY = (100_000, 50, 1_000)
 """Thresholds of the garbage collector (`gc.set_threshold`) while kernels are compiled."""
 
@@ -98,6 +104,44 @@ class LeanLibrary(codegen.JITCodeLibrary):
         return reversed(order[:-1])
 
 
+class PortableCodegen(codegen.JITCPUCodegen):
+    """Code generator for all processors of the microarchitecture level x86-64-v3.
+
+    Its kernels are as fast as those for one processor. All machines of a cluster can share them,
+    and a wheel can contain them.
+    """
+
+    _library_class = LeanLibrary
+
+    def _get_host_cpu_name(self) -> str:
+        """Return LLVM's name of the level."""
+        return "x86-64-v3"
+
+    def _get_host_cpu_features(self) -> str:
+        """Return no features besides those of the level."""
+        return ""
+
+
+def _make_generator(usual: codegen.JITCPUCodegen) -> codegen.JITCPUCodegen:
+    """Return the code generator of kernels: a portable one if this processor has its features.
+
+    numba's settings of the processor (`NUMBA_CPU_NAME`, `NUMBA_CPU_FEATURES`, `NUMBA_ENABLE_AVX`)
+    take precedence.
+
+    Args:
+        usual: numba's code generator for this processor.
+    """
+    chosen: Any = config  # numba sets its attributes from the environment
+    is_default = chosen.CPU_NAME is None and chosen.CPU_FEATURES is None and chosen.ENABLE_AVX
+    if is_default and usual.magic_tuple()[0].startswith("x86_64"):
+        available = llvm.get_host_cpu_features()
+        if all(available.get(name, False) for name in PORTABLE_FEATURES):
+            return PortableCodegen("hrc_env")
+    generator = copy.copy(usual)
+    generator._library_class = LeanLibrary
+    return generator
+
+
 @contextlib.contextmanager
 def rare_collections() -> Generator[None]:
     """Collect garbage rarely in a context; collections take a fifth of the time of the compiler."""
@@ -121,7 +165,7 @@ def _overload_complaint(source: Any, target: Any) -> Any:
     return complain
 
 
-class LeanTyping(typing.Context):
+class LeanTyping(Context):
     """Typing context of numba in which assignments to slices have a constant error message.
 
     numba's message, which contains the shapes, takes a tenth of the compile time.
@@ -149,11 +193,9 @@ class LeanContext(cpu.CPUContext):
 def _lean_context() -> LeanContext:
     """Return the context that all kernels share."""
     usual: Any = registry.cpu_target.target_context
-    generator = copy.copy(usual.codegen())
-    generator._library_class = LeanLibrary
     context = LeanContext.__new__(LeanContext)
     context.__dict__.update(usual.__dict__)
-    context._internal_codegen = generator
+    context._internal_codegen = _make_generator(usual.codegen())
     context.typing_context = LeanTyping.__new__(LeanTyping)
     context.typing_context.__dict__.update(usual.typing_context.__dict__)
     context.cached_internal_func = {}  # numba's own functions must not use callees
@@ -179,6 +221,11 @@ class LeanFlags(compiler.Flags):
         return hash(frozenset(self._values))
 
 
+def _compare_flags_fast(dispatcher: Any) -> None:
+    """Let a dispatcher compile with `LeanFlags`."""
+    dispatcher._compiler._customize_flags = LeanFlags
+
+
 class CalleeDispatcher(registry.CPUDispatcher):
     """Dispatcher of a kernel that is called by other kernels."""
 
@@ -186,7 +233,7 @@ class CalleeDispatcher(registry.CPUDispatcher):
 
     def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
         super().__init__(py_func, targetoptions=targetoptions)
-        self._compiler._customize_flags = LeanFlags
+        _compare_flags_fast(self)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the signature of a call, with generalised types of its arguments."""
@@ -223,7 +270,7 @@ class KernelDispatcher(registry.CPUDispatcher):
         self.callee = CalleeDispatcher(
             py_func, targetoptions={**targetoptions, "no_cpython_wrapper": True}
         )
-        self._compiler._customize_flags = LeanFlags
+        _compare_flags_fast(self)
         self._cache: Any = KernelCache(self)
 
     def compile(self, sig: Any) -> Any:

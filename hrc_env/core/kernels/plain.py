@@ -1,6 +1,6 @@
 """The standard path through numba's compiler, for releases for which `lean` was not tested.
 
-Callees are compiled at every level of calls. Kernels take about twice as long to compile as with
+Callees are compiled at every level of calls. Kernels take several times as long to compile as with
 `lean`, and run equally fast.
 """
 

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
+import hrc_env
 from hrc_env.core.folders import temporary_cache
 from hrc_env.core.kernels import cache, kernel
 
-PACKAGE = cache.PACKAGE
+PACKAGE = Path(hrc_env.__file__).resolve().parent
 KERNEL = "hrc_env.observations:_scale"
 COMPILE = """
 import numpy as np
@@ -115,13 +116,12 @@ def unwritable(tmp_path) -> Path:
 
 
 @pytest.fixture
-def find_folder(monkeypatch):
-    """The folder of kernels for a user's cache and a package in these places."""
+def find_folder(monkeypatch, tmp_path):
+    """The folder of kernels for a user's cache in this place."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
 
-    def find(home: Path, package: Path) -> Path:
+    def find(home: Path) -> Path:
         monkeypatch.setenv("XDG_CACHE_HOME", str(home))
-        monkeypatch.setattr(cache, "PACKAGE", package)
         cache.folder.cache_clear()
         return cache.folder()
 
@@ -132,24 +132,25 @@ def find_folder(monkeypatch):
 def test_kernels_go_to_the_users_cache_or_where_files_can_be_written(
     find_folder, tmp_path, unwritable
 ):
-    package = tmp_path / "package"
-    assert find_folder(tmp_path, package) == tmp_path / "hrc_env" / "kernels"
-    assert find_folder(unwritable, package) == package / "__pycache__" / "kernels"
-    assert find_folder(unwritable, unwritable) == temporary_cache() / "kernels"
+    assert find_folder(tmp_path) == tmp_path / "hrc_env" / "kernels"
+    assert find_folder(unwritable) == temporary_cache() / "kernels"
 
 
-def test_kernels_in_a_folder_that_is_only_read_are_used(find_folder, tmp_path, unwritable):
-    """As in a distribution that contains them: the folder beside the package is looked at, too."""
-    package = tmp_path / "package"
-    find_folder(unwritable, package)
+@pytest.mark.parametrize("place", ["distributed", "hrc_env/kernels"])
+def test_kernels_in_a_folder_that_is_only_read_are_used(tmp_path, monkeypatch, place):
+    """As in a wheel that contains them, or in a user's cache that cannot be written."""
+    monkeypatch.setattr(cache, "DISTRIBUTED", tmp_path / "distributed")
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / place)
     assert make_kernel(5.0)(1.0) == 6.0
-    (kept,) = (package / "__pycache__" / "kernels").glob("*grow*")
-    find_folder(tmp_path, package)
+    (kept,) = (tmp_path / place).glob("*grow*")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "elsewhere")
     again = make_kernel(5.0)
     assert again(1.0) == 6.0
     assert sum(again.stats.cache_hits.values()) == 1
-    assert not list((tmp_path / "hrc_env" / "kernels").glob("*grow*"))
     assert kept.exists()
+    assert not (tmp_path / "elsewhere").exists()
 
 
 @pytest.mark.parametrize("error", [errno.ENOSPC, errno.EROFS])

@@ -1,13 +1,16 @@
 """Kernels give what Python gives; callees are part of them; others' functions are left alone."""
 
 import gc
+import platform
 
+import llvmlite.binding
 import numba
 import numpy as np
 import pytest
+from numba.core import registry
 from numba.core.codegen import JITCodeLibrary
 
-from hrc_env.core.kernels import DISPATCHER, kernel
+from hrc_env.core.kernels import DISPATCHER, kernel, lean
 from hrc_env.core.kernels.lean import KernelDispatcher, LeanLibrary
 
 pytestmark = pytest.mark.skipif(
@@ -128,3 +131,31 @@ def test_garbage_is_collected_as_usual_after_a_compilation():
     with pytest.raises(numba.TypingError):
         kernel(lambda x: x.no_such_attribute)(1.0)
     assert gc.get_threshold() == before
+
+
+SHOW_PROCESSOR = """
+from hrc_env.core.kernels.lean import _lean_context
+print(_lean_context().codegen().magic_tuple())
+"""
+
+
+def test_kernels_are_for_all_processors_of_a_level_unless_numba_has_one_set(process):
+    usual = process("-c", SHOW_PROCESSOR)
+    assert usual.returncode == 0, usual.stderr
+    available = llvmlite.binding.get_host_cpu_features()
+    if platform.machine() == "x86_64" and available["avx2"]:
+        assert "'x86-64-v3', ''" in usual.stdout
+    chosen = process("-c", SHOW_PROCESSOR, NUMBA_CPU_NAME="generic")
+    assert "'generic', ''" in chosen.stdout
+    assert "-avx" in process("-c", SHOW_PROCESSOR, NUMBA_ENABLE_AVX="0").stdout
+
+
+@pytest.mark.parametrize("left_out", ["avx2", "fma", "bmi2", "lzcnt"])
+def test_a_processor_without_a_feature_of_the_level_gets_code_of_its_own(monkeypatch, left_out):
+    usual = registry.cpu_target.target_context.codegen()
+    features = dict.fromkeys(lean.PORTABLE_FEATURES, True)
+    monkeypatch.setattr(llvmlite.binding, "get_host_cpu_features", lambda: features)
+    if usual.magic_tuple()[0].startswith("x86_64"):
+        assert isinstance(lean._make_generator(usual), lean.PortableCodegen)
+    features[left_out] = False
+    assert lean._make_generator(usual).magic_tuple() == usual.magic_tuple()
