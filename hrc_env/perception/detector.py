@@ -86,6 +86,13 @@ class DetectorConfig:
     outside_confidence: float = 0.1
     """Maximum confidence of joints that the network locates outside the image, because these
     positions are extrapolated."""
+    every: int = 1
+    """Number of steps from one image that a camera uses to the next; the intervals below are then
+    longer, too. All images are used while a worker is not tracked and may be present. The emulator
+    of `perception="keypoints"` leaves out the same images."""
+    in_turns: bool = False
+    """Whether the cameras use images in turns, 1 / `every` of them in each step, instead of all in
+    the same step."""
     search_every: int = 5
     """Number of steps between searches of a camera's whole image while no person is found in it."""
     runtime: str = "litert"
@@ -108,7 +115,7 @@ class DetectorConfig:
         check_names("detector.network", [self.network], network.NETWORKS)
         check_names("detector.folded_network", [self.folded_network], network.NETWORKS)
         check_fields(self, "be in (0, 1]", "min_presence", "check_presence", "outside_confidence")
-        check_fields(self, "be positive", "check_every", "search_every", "max_hip_offset")
+        check_fields(self, "be positive", "check_every", "every", "search_every", "max_hip_offset")
 
     @property
     def weights(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from hrc_env.perception.emulator import EmulatorState
 from hrc_env.perception.faults.fault import IMAGE
 from hrc_env.perception.faults.schedule import History, Schedule
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput, TrueState, require_truth
-from hrc_env.pipeline.tracking import PoseTracking, make_setup, no_keypoints
+from hrc_env.pipeline.tracking import PoseTracking, leave_out_cameras, make_setup, no_keypoints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, draw_look
 from hrc_env.tracking.estimators import Estimator
@@ -187,6 +187,9 @@ class EmulatorPipeline(PoseTracking):
         """Return the relative light intensity in environment b's episode."""
         return float(self.cameras.light[b])
 
-    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+    def detect(
+        self, ids: Ints, expected: PoseEstimate, due: Bools, sensor_rngs: Generators
+    ) -> Keypoints:
         """Return the keypoints of the emulated cameras in environments `ids`."""
-        return self.cameras.keypoints(expected, sensor_rngs)
+        now_s = (self.steps[ids] + 1) * self.setup.dt_s
+        return leave_out_cameras(self.cameras.keypoints(expected, sensor_rngs), due, now_s)

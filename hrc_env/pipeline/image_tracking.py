@@ -70,19 +70,23 @@ class ImageTracking(PoseTracking):
         super().__init__(batch, setup, tracker, sensor)
         self.image_sensor, self.worker_detector = sensor, detector
 
-    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+    def detect(
+        self, ids: Ints, expected: PoseEstimate, due: Bools, sensor_rngs: Generators
+    ) -> Keypoints:
         """Return keypoints from crops around the predicted workers, or from a search."""
         sensor = self.image_sensor
         seen = no_keypoints(len(ids), len(self.setup.cameras), self.setup.n_workers)
         time_s, robots_world = np.zeros(seen.px.shape[:2]), sensor.robots_world()
         for row, b in enumerate(ids.tolist()):
-            time_s[row] = sensor.show(b)
+            time_s[row] = np.where(due[row], sensor.show(b), np.nan)
+            if not due[row].any():
+                continue
             has_image = np.isfinite(time_s[row]).tolist()
             predicted = one(expected, row)
             robot_world = None if robots_world is None else robots_world[row]
             out = one(seen, row)
             self.worker_detector.detect(sensor.images, predicted, b, has_image, out, robot_world)
-        return replace(seen, time_s=time_s if sensor.has_times else None)
+        return replace(seen, time_s=time_s if sensor.has_times or not due.all() else None)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
         """Return a mask (B, C) of the cameras with a whole image that was searched for people."""

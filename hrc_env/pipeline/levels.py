@@ -108,6 +108,7 @@ def has_calibrated_errors(estimator: EstimatorChoice, config: HRCConfig) -> bool
     They were calibrated for the default estimator with the default settings.
     """
     is_default = config.tracker == ParticleConfig() and config.emulator == EmulatorConfig()
+    is_default &= config.detector.every == 1
     return is_default and find_estimator(estimator).name in CALIBRATED_ESTIMATORS
 
 

@@ -145,11 +145,12 @@ class PoseTracker:
         self._films = _Films(len(rig))
         self._tracking = ImageTracking(
             1,
-            TrackingSetup(rig, n_workers, seen, dt_s),
+            TrackingSetup(rig, n_workers, seen, dt_s, every=settings.every,
+                          in_turns=settings.in_turns),
             make_estimator(estimator, projections(rig), dt_s, tracker),
             self._films,
             WorkerDetector(1, rig, n_workers, settings, floor_world),
-        )
+        )  # fmt: skip
 
     def update(
         self,

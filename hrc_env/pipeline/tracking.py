@@ -151,6 +151,10 @@ class TrackingSetup:
     """Calibration of the errors of the joints detected by the network."""
     is_calibrated: bool = False
     """Whether bounds on the errors of the estimates are calibrated (`safety.error_bounds`)."""
+    every: int = 1
+    """Number of steps from one image that a camera uses to the next (`DetectorConfig`)."""
+    in_turns: bool = False
+    """Whether the cameras use images in turns."""
 
 
 def make_setup(scene: Scene, config: HRCConfig, is_calibrated: bool = False) -> TrackingSetup:
@@ -169,6 +173,8 @@ def make_setup(scene: Scene, config: HRCConfig, is_calibrated: bool = False) -> 
         association=config.association,
         calibration=config.emulator.make_calibration(),
         is_calibrated=is_calibrated,
+        every=config.detector.every,
+        in_turns=config.detector.in_turns,
     )
 
 
@@ -236,7 +242,8 @@ class PoseTracking(PerceptionPipeline):
         state = self.state if whole else rows(self.state, ids)
         self.tracker.predict(state, dt_s, tracker_rngs)
         expected = self.drop_given_up(ids, self.tracker.estimate(state))
-        found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.setup.cameras)
+        due = self._find_due_cameras(ids, expected)
+        found = pinhole_keypoints(self.detect(ids, expected, due, sensor_rngs), self.setup.cameras)
         self.steps[ids] += 1
         if found.time_s is not None:
             leave_out_frozen(self.frozen, ids, found)
@@ -299,15 +306,28 @@ class PoseTracking(PerceptionPipeline):
         kept = {name: getattr(now, name) for name in ("unknown", "unobserved_s", "seen_world")}
         return replace(later, **kept)
 
-    def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
+    def detect(
+        self, ids: Ints, expected: PoseEstimate, due: Bools, sensor_rngs: Generators
+    ) -> Keypoints:
         """Detect the keypoints of people, in image pixels and without association to workers.
 
         Args:
             ids: (B,) indices of environments.
             expected: (B, W, ...) prediction of the tracker.
+            due: (B, C) mask of the cameras whose images are used.
             sensor_rngs: one generator for each of `ids`.
         """
         raise NotImplementedError
+
+    def _find_due_cameras(self, ids: Ints, expected: PoseEstimate) -> Bools:
+        """Return a mask (B, C) of the cameras whose images are used in this step.
+
+        They are all cameras while a worker who may be present is not tracked.
+        """
+        c = np.arange(len(self.setup.cameras)) * self.setup.in_turns
+        due = (self.steps[ids, None] + c) % self.setup.every == 0
+        is_known = expected.tracked | self.presence.slots["absent"][ids]
+        return due | ~np.all(is_known, axis=1, keepdims=True)
 
     def _associate(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
         """Assign keypoints to the workers. If there is one worker, it is assigned all of them."""
@@ -338,6 +358,27 @@ class PoseTracking(PerceptionPipeline):
     def last_detections(self, b: int) -> Detections:
         """Return the last keypoints of environment `b`."""
         return Detections(rows(self.keypoints, np.array([b])), [])
+
+
+def leave_out_cameras(keypoints: Keypoints, due: Bools, now_s: Floats) -> Keypoints:
+    """Return keypoints (B, C, W, ...) without those of cameras that are not due.
+
+    Args:
+        keypoints: the keypoints.
+        due: (B, C) mask of the cameras whose images are used.
+        now_s: (B,) time of images without a timestamp [s].
+    """
+    if due.all():
+        return keypoints
+    taken_s = np.repeat(now_s[:, None], due.shape[1], 1)
+    taken_s = taken_s if keypoints.time_s is None else keypoints.time_s
+    out, none = ~due[:, :, None, None], no_keypoints(*keypoints.px.shape[:3])
+    return Keypoints(
+        np.where(out[..., None], none.px, keypoints.px),
+        np.where(out, none.confidence, keypoints.confidence),
+        np.where(out, none.sigma_px, keypoints.sigma_px),
+        np.where(due, taken_s, np.nan),
+    )
 
 
 def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
