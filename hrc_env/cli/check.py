@@ -149,10 +149,7 @@ def _check_weights() -> Finding:
 def _check_openvino() -> Finding:
     from hrc_env.perception import vino
 
-    if not vino.is_installed():
-        return Finding(True, f"not installed; it speeds up perception pixels: {vino.INSTALL}")
-    text = f"computes in {vino.precision()} if detector.runtime is openvino or auto"
-    return Finding(True, text)
+    return Finding(True, vino.describe_gain())
 
 
 def _check_environment() -> Finding:

@@ -21,6 +21,8 @@ class Setup:
 
     def run(self) -> int:
         """Carry out the setup and return 0, even without OpenGL, which only images require."""
+        from hrc_env.perception.vino import describe_gain  # here: --help imports no network
+
         console = Console()
         fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
         ready, message = find_opengl(console)
@@ -32,4 +34,5 @@ class Setup:
                 f"[yellow]no headless OpenGL[/]: {message}\n"
                 "Everything works without it except perception='pixels' and pictures."
             )
+        console.print(f"[green]ok[/] OpenVINO: {describe_gain()}", highlight=False)
         return 0

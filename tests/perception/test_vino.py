@@ -92,3 +92,11 @@ def test_where_openvino_is_missing_auto_is_litert_and_an_order_names_the_remedy(
 def test_an_unknown_runtime_is_told_the_valid_ones():
     with pytest.raises(ConfigError, match="Did you mean 'openvino'"):
         DetectorConfig(runtime="openvinno")
+
+
+def test_what_it_would_gain_is_said_where_it_is_missing(monkeypatch):
+    monkeypatch.setattr(vino, "is_installed", lambda: False)
+    assert f"by {1 - vino.TIME_SHARE:.0%}: {vino.INSTALL}" in vino.describe_gain()
+    monkeypatch.setattr(vino, "is_installed", lambda: True)
+    monkeypatch.setattr(vino, "precision", lambda: "bf16")
+    assert "computes in bf16" in vino.describe_gain()
