@@ -27,7 +27,7 @@ TIME_SHARE = 0.74
 
 
 def describe_gain() -> str:
-    """Return a sentence on what OpenVINO would gain or how to choose it."""
+    """Return a sentence on the gain of OpenVINO, or on the setting that selects it."""
     if is_installed():
         return f'computes in {precision()} if detector.runtime is "openvino" or "auto"'
     return (

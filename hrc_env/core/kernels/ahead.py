@@ -42,7 +42,7 @@ def missing(level: str | None = None) -> list[Signature]:
 
 @lru_cache(maxsize=8)
 def ensure(level: str) -> None:
-    """Compile what the first reset and step of a perception level call, and log the progress.
+    """Compile the kernels of the first reset and step of a perception level; log the progress.
 
     The other kernels of the level are then compiled in the background, or when they are called.
     """
@@ -87,14 +87,14 @@ def _compile_in_background(signatures: Sequence[Signature]) -> None:
 
 
 def _serve(
-    groups: Iterator[Sequence[Signature]], total_s: float, say: Say, niceness: int = 0
+    groups: Iterator[Sequence[Signature]], total_s: float, on_progress: Say, niceness: int = 0
 ) -> None:
     """Let one child process compile groups of kernels until none are left.
 
     Args:
         groups: iterator over groups, which other child processes share.
         total_s: estimated compile time of all groups [s].
-        say: callback that receives the progress.
+        on_progress: callback that receives the progress.
         niceness: increase of the niceness of the child process.
     """
     quiet = f"ignore:{UNTESTED}"  # the parent process warns once
@@ -114,7 +114,7 @@ def _serve(
             log.warning("Compiling %s failed; it is compiled when it is first called.", each.kernel)
         if answer in ("", UNSAVED):
             break
-        say(each.seconds / total_s, each.kernel.partition(":")[2])
+        on_progress(each.seconds / total_s, each.kernel.partition(":")[2])
     with suppress(OSError):
         process.communicate()
 

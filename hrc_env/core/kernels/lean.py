@@ -274,7 +274,7 @@ class KernelDispatcher(registry.CPUDispatcher):
         self._cache: Any = KernelCache(self)
 
     def compile(self, sig: Any) -> Any:
-        """Load or compile the kernel for a signature, and return what Python calls."""
+        """Load or compile the kernel for a signature, and return the function that Python calls."""
         with rare_collections():
             return super().compile(sig)
 

@@ -100,10 +100,17 @@ def test_files_that_were_not_used_for_longest_are_removed(tmp_path, monkeypatch)
     assert {each.stem for each in tmp_path.iterdir()} == {"used", "new", "not ours"}
 
 
-@pytest.mark.parametrize("setting", ["NUMBA_BOUNDSCHECK", "NUMBA_DEBUGINFO"])
-def test_other_settings_of_the_compiler_find_other_files(setting, process, tmp_path):
+@pytest.mark.parametrize(
+    ("setting", "usual", "other"),
+    [
+        ("NUMBA_BOUNDSCHECK", "0", "1"),
+        ("NUMBA_DEBUGINFO", "0", "1"),
+        ("NUMBA_CPU_NAME", None, "generic"),
+    ],
+)
+def test_other_settings_and_processors_find_other_files(setting, usual, other, process, tmp_path):
     code = COMPILE.format(KERNEL)
-    for value, was_there in (("0", "False"), ("1", "False"), ("1", "True"), ("0", "True")):
+    for value, was_there in ((usual, "False"), (other, "False"), (other, "True"), (usual, "True")):
         done = process("-c", code, NUMBA_CACHE_DIR=str(tmp_path), **{setting: value})
         assert done.stdout.split() == [was_there, "True"], done.stderr
 
