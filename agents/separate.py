@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import registration
+from hrc_env.core import folders
 from hrc_env.core.errors import AgentError, HRCError
 from hrc_env.core.kernels.cache import folder as find_kernels
 from hrc_env.core.registry import FILES
@@ -213,6 +214,8 @@ def _start(own: Path, submission: Submission, theirs: socket.socket) -> subproce
         "PYTHONPATH": os.pathsep.join(map(str, (library, policy, *installed))),
         registration.IMPORT: os.pathsep.join(dict.fromkeys(imported)),
     }  # fmt: skip
+    if usual := folders.usual_cache():
+        variables["XDG_CACHE_HOME"] = str(usual.parent)  # compiled kernels, which it may read
     command = [sys.executable, "-P", "-m", f"{__package__}.serving", str(theirs.fileno())]
     if confinement.find_version():
         prefixes = (sys.prefix, sys.base_prefix, sys.exec_prefix)

@@ -100,6 +100,28 @@ def test_a_command_evaluates_separately(capsys):
     assert "return_mean" in said[0]
 
 
+FINDER = """
+import numpy as np
+from hrc_env.core.kernels.signatures import recorded
+
+
+class Finder:
+    def __init__(self, env_info):
+        self.n = env_info.n_actions
+
+    def act(self, observation):
+        found = all(each.is_compiled() for each in recorded("none first"))
+        return np.full((len(observation), self.n), float(found))
+"""
+
+
+def test_compiled_kernels_are_found_in_the_process_of_a_policy(folder, env_info):
+    Path("finder.py").write_text(FINDER)
+    agent = apart("finder:Finder")(env_info)
+    with closing(agent):
+        assert agent.act(np.zeros((2, len(env_info.layout.low)), np.float32)).all()
+
+
 FORGERS = ("Collector", "FrameWalker", "Patcher")
 
 
