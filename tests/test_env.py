@@ -225,7 +225,7 @@ def hide_everything(env: HRCEnv) -> None:
         np.full_like(blank.px, np.nan), np.zeros_like(blank.confidence),
         np.full_like(blank.sigma_px, np.inf),
     )  # fmt: skip
-    pipeline.detect = lambda now, predicted, rngs: nothing
+    pipeline.detect = lambda ids, expected, due, rngs: nothing
 
 
 def test_contact_ends_the_episode_when_asked():

@@ -216,10 +216,10 @@ def crops_round_the_true_body(patch):
     """Which is to say: windows."""
     detect = PixelPipeline.detect
 
-    def leaking(self, ids, expected, rngs):
+    def leaking(self, ids, expected, due, rngs):
         middle = expected.mean_world.mean(2, keepdims=True)
         joints = expected.mean_world + hips_of(self) - middle
-        return detect(self, ids, dataclasses.replace(expected, mean_world=joints), rngs)
+        return detect(self, ids, dataclasses.replace(expected, mean_world=joints), due, rngs)
 
     patch.setattr(PixelPipeline, "detect", leaking)
 

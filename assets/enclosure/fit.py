@@ -2,8 +2,8 @@
 
 The axes of the capsules are fitted by least squares, with left and right sides pooled. A radius is
 such that at most `PROTRUSION_M` of the true surfaces protrudes from it for 95 % of the poses of the
-worst body. Then each body is left out in turn: the table has the distance by which it protrudes from a
-fit to the others, in the 95 % quantile.
+worst body. Then each body is left out in turn: the table has the distance by which it protrudes
+from a fit to the others, in the 95 % quantile.
 """
 
 import json

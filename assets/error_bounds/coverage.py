@@ -94,7 +94,7 @@ def measure_coverage(errors: Sequence[Errors], bounds: ErrorBounds) -> dict[str,
     """Return how many errors of each part are covered, and by what margins.
 
     "bound" counts errors with a calibrated bound, "margin" all errors, which the constant margin
-    must cover where there is no bound, and "constant" all errors, against the constant margin alone.
+    must cover where there is no bound, and "constant" all errors, against that margin alone.
     """
     coverage: dict[str, Coverage] = {}
     for part, sample in join_sides(errors).items():
