@@ -121,7 +121,8 @@ def _count_covered(name: str, sample: Errors, margin_m: Floats, among: Bools) ->
     if not among.any():
         return {}
     _, episode = np.unique(sample.episode[among], return_inverse=True)
-    covered = np.bincount(episode, sample.error_m[among] <= margin_m[among])
+    is_covered = (sample.error_m[among] <= margin_m[among]).astype(float)
+    covered = np.bincount(episode, is_covered).astype(float)
     share = estimate_clustered_share(covered, np.bincount(episode).astype(float))
     return {
         f"{name}.episodes": share.n, f"{name}.covered": share.value, f"{name}.low": share.low,
