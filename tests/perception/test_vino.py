@@ -1,6 +1,8 @@
 """OpenVINO, the extra: the same landmarks as LiteRT's, and words where it is missing."""
 
+import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -100,3 +102,9 @@ def test_what_it_would_gain_is_said_where_it_is_missing(monkeypatch):
     monkeypatch.setattr(vino, "is_installed", lambda: True)
     monkeypatch.setattr(vino, "precision", lambda: "bf16")
     assert "computes in bf16" in vino.describe_gain()
+
+
+def test_the_gain_is_the_measured_one():
+    measured = json.loads(Path("benchmarks/speed/pixels.json").read_text())["measured"]
+    share = measured["every image, OpenVINO"]["time_ratio_quartiles"][1]
+    assert round(share, 2) == vino.TIME_SHARE

@@ -110,7 +110,7 @@ class KernelCache(NullCache):
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:  # type: ignore[override]
         """Save a compiled form; log a warning if that is impossible."""
-        path = self.path(_args(sig))
+        path = folder() / self.path(_args(sig)).name
         draft = path.with_name(f"{uuid.uuid4().hex}.tmp")
         form = dumps(data._reduce())
         try:

@@ -199,3 +199,17 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, monkeypatch, damage):
     third = make_kernel(9.0)
     assert third(1.0) == 10.0
     assert sum(third.stats.cache_hits.values()) == 1
+
+
+def test_a_damaged_file_of_a_distribution_is_replaced_in_the_users_cache(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "DISTRIBUTED", tmp_path / "distributed")
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "distributed")
+    assert make_kernel(11.0)(1.0) == 12.0
+    (kept,) = (tmp_path / "distributed").glob("*grow*")
+    kept.write_bytes(b"damaged")
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path / "own")
+    assert make_kernel(11.0)(1.0) == 12.0
+    assert kept.read_bytes() == b"damaged"
+    again = make_kernel(11.0)
+    assert again(1.0) == 12.0
+    assert sum(again.stats.cache_hits.values()) == 1
