@@ -89,13 +89,7 @@ def main(words: Sequence[str] | None = None) -> int:
         The exit status: 2 for a wrong command or option, 130 after Ctrl-C.
     """
     given = list(sys.argv[1:] if words is None else words)
-    if not given or given[0] in ("-h", "--help"):
-        print(overview())
-        return 0 if given else 2
-    if given[0] == "--version":
-        print(versions())
-        return 0
-    return show_errors(lambda: _run(*import_first(given, PROGRAM)))
+    return show_errors(lambda: _answer(given))
 
 
 def overview() -> str:
@@ -119,6 +113,17 @@ def versions() -> str:
     named = {"hrc_env": __version__, "Python": platform.python_version()}
     named |= {package: version(package) for package in ("mujoco", "gymnasium")}
     return ", ".join(f"{name} {number}" for name, number in named.items())
+
+
+def _answer(given: Sequence[str]) -> int:
+    """Print help or versions, or run a command; return the exit status."""
+    if not given or given[0] in ("-h", "--help"):
+        print(overview())
+        return 0 if given else 2
+    if given[0] == "--version":
+        print(versions())
+        return 0
+    return _run(*import_first(given, PROGRAM))
 
 
 def _run(name: str, *words: str) -> int:

@@ -14,10 +14,14 @@ def show_errors(run: Callable[[], int]) -> int:
     """Run a function, print an `HRCError` without a traceback, and return the exit status.
 
     Returns:
-        The status that the function returns; 2 after an `HRCError`; 130 after Ctrl-C.
+        The status that the function returns; 2 after an `HRCError`; 130 after Ctrl-C; 141 if the
+        program that reads the output, such as `head`, has ended.
     """
     try:
-        return run()
+        try:
+            return run()
+        finally:
+            sys.stdout.flush()  # a closed pipe is noticed here and not when the interpreter ends
     except HRCError as error:
         from rich.console import Console
         from rich.markup import escape
@@ -29,6 +33,9 @@ def show_errors(run: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         print("Stopped.", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
 
 
 def import_first(words: Sequence[str], program: str) -> list[str]:

@@ -1,5 +1,7 @@
 """`python -m hrc_env` itself: what it says of its commands, and how it refuses."""
 
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -128,3 +130,16 @@ def test_other_values_that_mean_nothing_are_refused(words, capsys):
 def test_a_command_that_only_a_clone_has_says_how_it_is_called_there(name, today, capsys):
     assert main([name, "--help"]) == 2
     assert today in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize("command", [["--help"], ["evaluate", "--help"]])
+def test_a_reader_that_ends_early_gets_no_traceback(command: list[str]):
+    """As with `python -m hrc_env evaluate --help | head -1`."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hrc_env", *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    process.stdout.close()
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 141
+    assert not errors
