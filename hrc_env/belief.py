@@ -5,11 +5,12 @@ It never contains the truth about the workers.
 
 import math
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from hrc_env.core.batching import change_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.lending import read_only
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
@@ -104,7 +105,7 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
     nearest = least_separation(
         robot.capsules_world, robot.capsule_radius_m, bodies.ends_world, bodies.radius_m
     )
-    return replace(nearest, distance_m=np.where(estimate.tracked, nearest.distance_m, np.inf))
+    return change_fields(nearest, distance_m=np.where(estimate.tracked, nearest.distance_m, np.inf))
 
 
 def find_unseen_floor(
@@ -144,7 +145,7 @@ def drop_distant_unknown(estimate: PoseEstimate, unseen: UnseenFloor | None) -> 
         return estimate
     far = np.isinf(unseen.possible_m) & np.isinf(unseen.probable_m)
     elsewhere = far[:, None] & (_never_seen(estimate) | estimate.tracked)
-    return replace(estimate, unknown=estimate.unknown & ~elsewhere)
+    return change_fields(estimate, unknown=estimate.unknown & ~elsewhere)
 
 
 def _never_seen(estimate: PoseEstimate) -> Bools:

@@ -6,7 +6,7 @@ streams of that environment, never on the size of the batch.
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.control import joint_command, max_command, n_actions
-from hrc_env.core.batching import State, Stateful, rows, select_streams, write_rows
+from hrc_env.core.batching import State, Stateful, change_fields, rows, select_streams, write_rows
 from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_shape, require
 from hrc_env.core.infos import Info
@@ -474,7 +474,7 @@ class Simulation(Stateful):
         around = worker_capsules(self.bodies, path, motion.body), workers.capsule_radius_m
         paths = incidents.measure_paths(arm, world.robot.capsule_radius_m, *around)
         touched = paths.gaps_m.min((1, 2), initial=np.inf) <= 0.0
-        world = replace(world, workers=progress, touched=touched, place=self.place)
+        world = change_fields(world, workers=progress, touched=touched, place=self.place)
         task_step = task.advance(self.task_state, self.streams["task"], world, config.ctrl_dt)
         return Truth(self._everyone, world, motion, workers, paths, task_step)
 
@@ -540,7 +540,7 @@ class Simulation(Stateful):
             model=self.model,
             unseen=unseen,
         )
-        return replace(belief, allowed_contact=self.task.allowed_contact(belief))
+        return change_fields(belief, allowed_contact=self.task.allowed_contact(belief))
 
     def _open(self, truth: Truth, belief: Belief) -> StepResult:
         """Return the initial observations and infos of new episodes."""

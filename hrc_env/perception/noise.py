@@ -6,11 +6,12 @@ joints; the estimates that are passed on are converted to the joints of our skel
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.batching import change_fields
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -105,13 +106,18 @@ def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> Pose
         estimate: (B, W, ...) estimate of the network's joints.
         known: a calibration; None for the calibration of the package.
     """
-    known = known or read_calibration()
-    variance_m2 = known.wander_m**2 + known.between_m**2
-    tables = np.concatenate([known.offset_m, variance_m2], -1).reshape(len(POSTURES), -1)
-    offsets = Offsets(tables, known.poses, float(known.near_m), known.novel)
+    offsets = _make_offsets(known or read_calibration())
     mean_world, cov_world = estimate.mean_world.copy(), estimate.cov_world.copy()
     _correct_joints(mean_world, cov_world, estimate.velocity_world, estimate.tracked, offsets)
-    return replace(estimate, mean_world=mean_world, cov_world=cov_world)
+    return change_fields(estimate, mean_world=mean_world, cov_world=cov_world)
+
+
+@lru_cache(maxsize=8)
+def _make_offsets(known: Calibration) -> Offsets:
+    """Return the offsets of a calibration."""
+    variance_m2 = known.wander_m**2 + known.between_m**2
+    tables = np.concatenate([known.offset_m, variance_m2], -1).reshape(len(POSTURES), -1)
+    return Offsets(tables, known.poses, float(known.near_m), known.novel)
 
 
 @kernel(makes_arrays=True)

@@ -1,12 +1,12 @@
 """The tracking loop: prediction, detection, update and estimation of presence."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import Stateful, rows, write_rows
+from hrc_env.core.batching import Stateful, change_fields, rows, write_rows
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
@@ -263,7 +263,8 @@ class PoseTracking(PerceptionPipeline):
         looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         estimate = add_agreement(estimate, keypoints, age_s, self.P, self.axes[:, 2])
         if self.setup.is_calibrated:
-            estimate = replace(estimate, calibrated=np.ones(estimate.tracked.shape, np.bool_))
+            calibrated = np.ones(estimate.tracked.shape, np.bool_)
+            estimate = change_fields(estimate, calibrated=calibrated)
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 
@@ -304,7 +305,7 @@ class PoseTracking(PerceptionPipeline):
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
         kept = {name: getattr(now, name) for name in ("unknown", "unobserved_s", "seen_world")}
-        return replace(later, **kept)
+        return change_fields(later, **kept)
 
     def detect(
         self, ids: Ints, expected: PoseEstimate, due: Bools, sensor_rngs: Generators
@@ -324,7 +325,10 @@ class PoseTracking(PerceptionPipeline):
 
         They are all cameras while a worker who may be present is not tracked.
         """
-        c = np.arange(len(self.setup.cameras)) * self.setup.in_turns
+        n_cameras = len(self.setup.cameras)
+        if self.setup.every == 1:
+            return np.ones((len(ids), n_cameras), np.bool_)
+        c = np.arange(n_cameras) * self.setup.in_turns
         due = (self.steps[ids, None] + c) % self.setup.every == 0
         is_known = expected.tracked | self.presence.slots["absent"][ids]
         return due | ~np.all(is_known, axis=1, keepdims=True)

@@ -6,11 +6,11 @@ may be detected with confidence in the wrong place.
 """
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.batching import change_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Floats, Ints
@@ -52,9 +52,9 @@ def add_agreement(
     """
     shape = estimate.age_s.shape
     agreement = Agreement(np.zeros(shape, np.int64), np.zeros(shape))
-    arrays = get_keypoint_arrays(keypoints), np.nan_to_num(age_s), get_estimate_arrays(estimate)
+    arrays = get_keypoint_arrays(keypoints), age_s, get_estimate_arrays(estimate)
     _measure_agreement(*arrays, P, focal_px, agreement)
-    return replace(estimate, n_views=agreement.n_views, misfit=agreement.misfit)
+    return change_fields(estimate, n_views=agreement.n_views, misfit=agreement.misfit)
 
 
 @kernel
@@ -74,7 +74,8 @@ def _measure_agreement(
         u, v = px[b, c, w, j, 0], px[b, c, w, j, 1]
         if not is_measurement(u, v, confidence, sigma_px):
             continue
-        (x, y, z), (vx, vy, vz), ago = mean[b, w, j], velocity[b, w, j], age_s[b, c]
+        ago = age_s[b, c] if math.isfinite(age_s[b, c]) else 0.0
+        (x, y, z), (vx, vy, vz) = mean[b, w, j], velocity[b, w, j]
         at_u, at_v, depth = pixel_of(P[c], x - ago * vx, y - ago * vy, z - ago * vz)
         off = math.hypot(at_u - u, at_v - v) / sigma_px if depth > 0.0 else MAX_SIGMAS
         agreement.misfit[b, w, j] += min(off, MAX_SIGMAS) ** 2

@@ -63,7 +63,7 @@ def find_unexplained(
     """
     shape = keypoints.confidence.shape[:2]
     detected = DetectedPoses(np.zeros(shape, np.bool_), np.zeros(shape, np.bool_))
-    arrays = get_keypoint_arrays(keypoints), np.nan_to_num(age_s), get_estimate_arrays(estimate)
+    arrays = get_keypoint_arrays(keypoints), age_s, get_estimate_arrays(estimate)
     _find_unexplained(*arrays, P, focal_px, detected)
     return detected
 
@@ -82,12 +82,13 @@ def _find_unexplained(
     mean, velocity = estimate.mean_world, estimate.velocity_world
     for b in range(len(px)):
         for c in range(len(P)):
+            ago = age_s[b, c] if math.isfinite(age_s[b, c]) else 0.0
             for w in range(tracked.shape[1]):
                 n, off = 0, 0
                 fits = tracked[b, w] and SMALLEST_M < _measure_side(mean[b, w]) < LARGEST_M
                 for j in range(confidence.shape[3]):
                     if confidence[b, c, w, j] >= SEEN_WELL:
-                        (x, y, z), (vx, vy, vz), ago = mean[b, w, j], velocity[b, w, j], age_s[b, c]
+                        (x, y, z), (vx, vy, vz) = mean[b, w, j], velocity[b, w, j]
                         u, v, depth = pixel_of(P[c], x - ago * vx, y - ago * vy, z - ago * vz)
                         away_px = math.hypot(u - px[b, c, w, j, 0], v - px[b, c, w, j, 1])
                         near_px = EXPLAINED_M * focal_px[c] / max(depth, 1e-9)

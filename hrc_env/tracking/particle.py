@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hrc_env.core.declared import Records1, make_records
+from hrc_env.core.declared import Records1
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
@@ -26,7 +26,12 @@ from hrc_env.tracking.tree.body_filter import predict_all, update_all
 from hrc_env.tracking.tree.learning import NoiseModel, make_noise_model
 from hrc_env.tracking.tree.predict import make_motion_model
 from hrc_env.tracking.tree.report import estimate_all
-from hrc_env.tracking.tree.state import Hypotheses, Tree, Work, make_hypotheses, reset_hypotheses
+from hrc_env.tracking.tree.state import (
+    Hypotheses,
+    lend_scratch,
+    make_hypotheses,
+    reset_hypotheses,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,14 +68,17 @@ class ParticleEstimator:
     def predict(self, state: Hypotheses, dt_s: float, rngs: Rngs) -> None:
         """Move every hypothesis by its motion model; `rngs` is not used."""
         model = make_motion_model(dt_s, self.config.damping, self.config.root_acceleration)
-        predict_all(state, model, dt_s, self.settings, make_records(Work, 1))
+        predict_all(state, model, dt_s, self.settings, lend_scratch().work)
 
     def update(self, state: Hypotheses, keypoints: Keypoints, rngs: Rngs) -> None:
         """Condition every hypothesis on one set of frames; `rngs` is not used."""
         batch, n_workers = state.n_alive.shape
         measured = get_keypoint_arrays(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        work, prior = make_records(Work, 1), make_records(Tree, 1)
-        update_all(state, self.cameras, measured, self.settings, self.noise_model, work, prior)
+        scratch = lend_scratch()
+        update_all(
+            state, self.cameras, measured, self.settings, self.noise_model, scratch.work,
+            scratch.prior,
+        )  # fmt: skip
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Return the moments of the mixture of hypotheses, with the ages of the heaviest one."""
@@ -78,8 +86,9 @@ class ParticleEstimator:
         age_s = np.empty((*tracked.shape, N_JOINTS))
         mean, velocity = np.empty((2, *age_s.shape, 3))
         out = EstimateArrays(mean, np.empty((*age_s.shape, 3, 3)), velocity, age_s, tracked)
-        estimate_all(state, self.settings, out)
-        return self._widen(state, PoseEstimate(*out))
+        is_displaced = estimate_all(state, self.settings, out)
+        estimate = PoseEstimate(*out)
+        return self._widen(state, estimate) if is_displaced else estimate
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
         """Return the estimate expected after `horizon_s` [s], a mixture over all hypotheses."""

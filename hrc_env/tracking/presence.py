@@ -19,12 +19,13 @@ or until that estimate has expired (after `FORGOTTEN` time constants `lost_relax
 measurement) and searches find no person. A search expires after `lost_after_s`, as a track does.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import Stateful, rows, write_rows
+from hrc_env.core.batching import Stateful, change_fields, rows, write_rows
 from hrc_env.core.declared import Records1, Records2, Records3, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -99,6 +100,11 @@ SEARCH_COUNT = dtype_of(SearchCount)
 class PresenceArrays(NamedTuple):
     """The arrays of `Presence` that an update changes in place."""
 
+    strangers: Ints
+    """(B, C) number of successive images in which a camera showed an unexplained person."""
+    doubt: Ints
+    """(B,) number of further updates for which all tracks are distrusted."""
+
     slots: Records2[Slot]
     """(B, W) presence of each worker."""
     searches: Records3[SearchCount]
@@ -115,17 +121,20 @@ class Evidence(NamedTuple):
     """The tracks and the searches in one update of `b` environments."""
 
     tracked: Bools
-    """(b, W) mask of the tracked workers."""
+    """(b, W) mask of the tracked workers; those that are distrusted are removed."""
     age_s: Floats
-    """(b, W) smallest age of the worker's joints [s]."""
+    """(b, W, J) ages of the workers' joints [s]."""
     mean_world: Points3
     """(b, W, J, 3) estimated positions of the joints [m]."""
     found: Floats
     """(b, C, W, J) confidence of the detections before association with workers."""
     assigned: Floats
     """(b, C, W, J) confidence of the detections after association."""
-    has_strangers: Bools
-    """(b,) mask of the environments in which there may be a person without a slot."""
+    shown: DetectedPoses
+    """(b, C) masks of the cameras that detect poses, and unexplained poses."""
+    others_age_s: Floats
+    """(b, N) time since people in excess of the slots were detected [s]; infinite in unused
+    rows."""
     searched: Bools
     """(b, C) mask of the cameras that searched their whole image."""
     image_age_s: Floats
@@ -149,6 +158,15 @@ class PresenceReport(NamedTuple):
     """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
     seen_world: Points3
     """(b, W, J, 3) estimated positions of the joints when a camera last saw the worker [m]."""
+
+
+class Strangers(NamedTuple):
+    """People without a slot in one environment."""
+
+    are_known: bool
+    """Whether there are more people than slots."""
+    are_possible: bool
+    """Whether there may be a person without a slot."""
 
 
 class FloorState(NamedTuple):
@@ -251,23 +269,16 @@ class Presence(Stateful):
             The estimate with `unknown`, `unobserved_s` and `seen_world`. While the cameras
             contradict the calibration, no worker is `tracked`.
         """
-        strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
-        strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])
-        self.strangers[ids] = strange
-        contradicted = self.find_contradicting_cameras(ids).any(1)
-        self.doubt[ids] = np.where(contradicted, AGREED, np.maximum(self.doubt[ids] - 1, 0))
-        doubtful = self.doubt[ids] > 0
-        estimate = replace(estimate, tracked=estimate.tracked & ~doubtful[:, None])
         write_rows(self.others, ids, searches.others)
-        several_show = (strange >= REPEATED).sum(1) >= LEAST_CAMERAS
         evidence = Evidence(
-            tracked=estimate.tracked,
-            age_s=estimate.age_s.min(-1),
-            mean_world=estimate.mean_world,
+            tracked=estimate.tracked.copy(),
+            age_s=np.ascontiguousarray(estimate.age_s),
+            mean_world=np.ascontiguousarray(estimate.mean_world),
             found=found.confidence,
             assigned=assigned.confidence,
-            has_strangers=searches.others.any | doubtful | several_show,
-            searched=searches.whole & (strange < REPEATED),
+            shown=searches.shown,
+            others_age_s=searches.others.age_s,
+            searched=searches.whole,
             image_age_s=searches.age_s,
             enough=searches.enough,
             dt_s=dt_s,
@@ -278,12 +289,15 @@ class Presence(Stateful):
         report = PresenceReport(
             np.empty(shape, np.bool_), np.empty(shape), np.empty_like(estimate.mean_world)
         )
-        arrays = (self.slots, self.searches, self.levels, self.age_s, self.coverage.cameras)
-        _update_slots(PresenceArrays(*arrays), ids, evidence, report)
-        unknown = report.unknown | searches.others.any[:, None]
-        return replace(
+        arrays = PresenceArrays(
+            self.strangers, self.doubt, self.slots, self.searches, self.levels, self.age_s,
+            self.coverage.cameras,
+        )  # fmt: skip
+        _update_slots(arrays, ids, evidence, report)
+        return change_fields(
             estimate,
-            unknown=unknown,
+            tracked=evidence.tracked,
+            unknown=report.unknown,
             unobserved_s=report.unobserved_s,
             seen_world=report.seen_world,
         )
@@ -294,19 +308,24 @@ def _update_slots(
     state: PresenceArrays, ids: Ints, evidence: Evidence, report: PresenceReport
 ) -> None:
     """Update the slots of environments `ids` from the rows of `evidence`, and fill in `report`."""
-    tracked, age_s = evidence.tracked, evidence.age_s
+    tracked = evidence.tracked
     for row in range(len(ids)):
+        strange = state.strangers[ids[row]]
+        strangers = _find_strangers(state, ids[row], row, evidence)
         for w in range(tracked.shape[1]):
             slot, search = state.slots[ids[row], w], state.searches[ids[row], w]
             level = state.levels[ids[row], w]
-            shown = _count_searches(search, row, w, evidence)
+            shown = _count_searches(search, strange, strangers.are_possible, row, w, evidence)
             if tracked[row, w]:
-                if not slot.lost or age_s[row, w] < slot.unobserved_s + 0.5 * evidence.dt_s:
+                age_s = math.inf
+                for joint_age_s in evidence.age_s[row, w]:
+                    age_s = min(age_s, joint_age_s)
+                if not slot.lost or age_s < slot.unobserved_s + 0.5 * evidence.dt_s:
                     _copy_points(evidence.mean_world[row, w], slot.seen_world)
-                slot.lost, slot.absent, slot.unobserved_s = True, False, age_s[row, w]
+                slot.lost, slot.absent, slot.unobserved_s = True, False, age_s
                 level[:] = POSSIBLE
             else:
-                if evidence.has_strangers[row]:  # the last position may be another person's
+                if strangers.are_possible:  # the last position may be another person's
                     _forget_place(slot)
                 state.age_s[ids[row], w] = _judge_floor(
                     slot, search, level, state.cameras, shown, evidence
@@ -314,24 +333,61 @@ def _update_slots(
             if tracked[row, w] or shown:
                 for c in range(len(search)):
                     search[c].empty = 0
-            report.unknown[row, w] = not (tracked[row, w] or slot.absent)
+            report.unknown[row, w] = strangers.are_known or not (tracked[row, w] or slot.absent)
             report.unobserved_s[row, w] = slot.unobserved_s
             _copy_points(slot.seen_world, report.seen_world[row, w])
 
 
 @kernel
-def _count_searches(search: Records1[SearchCount], row: int, w: int, evidence: Evidence) -> bool:
+def _find_strangers(state: PresenceArrays, b: int, row: int, evidence: Evidence) -> Strangers:
+    """Count images with unexplained people, and return whether there are people without a slot.
+
+    Tracks are distrusted for some time after the calibration was contradicted.
+
+    Args:
+        state: the presence, of which `strangers` and `doubt` are changed.
+        b: index of the environment.
+        row: row of the environment in `evidence`, of which `tracked` is changed.
+        evidence: the tracks and the searches of the update.
+    """
+    shown, strange, several, often = evidence.shown, state.strangers[b], 0, 0
+    for c in range(len(strange)):
+        if evidence.searched[row, c] or shown.poses[row, c]:
+            strange[c] = strange[c] + 1 if shown.unexplained[row, c] else 0
+        several += strange[c] >= REPEATED
+        often += strange[c] >= CONTRADICTED
+    state.doubt[b] = AGREED if often >= LEAST_CAMERAS else max(state.doubt[b] - 1, 0)
+    doubtful = state.doubt[b] > 0
+    if doubtful:
+        evidence.tracked[row] = False
+    are_known = False
+    for age_s in evidence.others_age_s[row]:
+        are_known |= age_s < np.inf
+    return Strangers(are_known, are_known or doubtful or several >= LEAST_CAMERAS)
+
+
+@kernel
+def _count_searches(
+    search: Records1[SearchCount],
+    strange: Ints,
+    has_strangers: bool,
+    row: int,
+    w: int,
+    evidence: Evidence,
+) -> bool:
     """Count the searches for one slot, and return whether a camera shows a person for the slot.
 
     A camera does so if it detects the slot's worker, or more people than there are tracks.
 
     Args:
         search: (C,) searches for the slot, changed in place.
+        strange: (C,) number of successive images of each camera with an unexplained person.
+        has_strangers: whether there may be a person without a slot.
         row: row of the environment in `evidence`.
         w: index of the slot.
         evidence: the tracks and the searches of the update.
     """
-    shown, people = evidence.has_strangers[row], evidence.tracked[row].sum()
+    shown, people = has_strangers, evidence.tracked[row].sum()
     for c in range(len(search)):
         search[c].since_s += evidence.dt_s
         n_found, found = 0, evidence.found[row, c]
@@ -339,7 +395,7 @@ def _count_searches(search: Records1[SearchCount], row: int, w: int, evidence: E
             n_found += _is_shown(found[k])
         if _is_shown(evidence.assigned[row, c, w]) or n_found > people:
             shown = True
-        elif evidence.searched[row, c]:
+        elif evidence.searched[row, c] and strange[c] < REPEATED:
             search[c].empty += 1
             search[c].since_s = evidence.image_age_s[row, c]
         if search[c].since_s >= evidence.lost_after_s:

@@ -49,14 +49,15 @@ _MOST = 25.0
 
 
 @kernel(makes_arrays=True)
-def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> None:
-    """Compute the estimates of all workers.
+def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> bool:
+    """Compute the estimates of all workers, and return whether a body may be displaced as a whole.
 
     Args:
         state: the hypotheses.
         settings: settings of the estimator.
         out: arrays of the estimates, filled in.
     """
+    is_displaced = False
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             trees, best = state.trees[b, w], state.trees[b, w, 0]
@@ -77,6 +78,9 @@ def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> 
             for j in range(out.age_s.shape[2]):
                 out.age_s[b, w, j] = best.age_s[j]
             out.tracked[b, w] = best.tracked
+            has_error = best.size_std != 0.0 or best.pair.is_misaligned
+            is_displaced = is_displaced or (best.tracked and has_error)
+    return is_displaced
 
 
 @kernel

@@ -6,6 +6,7 @@ together. Therefore the whole body is one Gaussian with the dependencies of the 
 conditions them on a set of frames, and `evidence` weights them.
 """
 
+import threading
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -334,6 +335,29 @@ def make_bone_prior() -> BoneLengths:
     """Return the means and variances of bone lengths in the population."""
     length = np.array([1.0 if k < 0 else BONE_LENGTH_M[k] for k in EDGE_BONE])
     return BoneLengths(length, (POPULATION_SHARE * length) ** 2)
+
+
+class Scratch(NamedTuple):
+    """Memory for intermediate results of kernels, whose contents are undefined."""
+
+    work: Records1[Work]
+    """(1,) work arrays for one tree."""
+    prior: Records1[Tree]
+    """(1,) a tree."""
+
+
+_THREAD = threading.local()
+"""The scratch memory of each thread."""
+
+
+def lend_scratch() -> Scratch:
+    """Return the scratch memory of the calling thread, which its next caller overwrites.
+
+    New arrays in every step would cost as much as a kernel in a single environment.
+    """
+    if not hasattr(_THREAD, "scratch"):
+        _THREAD.scratch = Scratch(make_records(Work, 1), make_records(Tree, 1))
+    return _THREAD.scratch
 
 
 def make_hypotheses(
