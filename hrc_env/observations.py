@@ -505,8 +505,9 @@ def observe(
     present = [terms[k] for k in layout.terms]
     values = [_value(term, belief) for term in present]
     for term, value in zip(present, values, strict=True):
-        name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
-        check_shape(name, rows, (batch,), "one entry per environment")
+        if np.shape(value)[:1] != (batch,):
+            name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
+            check_shape(name, rows, (batch,), "one entry per environment")
     parts = [value.reshape(batch, -1) for value in values]
     physical = np.concatenate(parts, axis=1)
     if physical.shape[1] != len(layout.scale):

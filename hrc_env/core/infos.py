@@ -350,16 +350,22 @@ def entry_of(name: str) -> Entry:
 def publish(info: Info) -> Info:
     """Return numbers (B,) without NaN, and the flags that state whether they were measured."""
     told: Info = {}
+    may_be_unmeasured = _list_unmeasured(tuple(info))
     for name, values in info.items():
-        entry = entry_of(name)
-        if entry.stand_in is None:
+        if name not in may_be_unmeasured:
             told[name] = values
             continue
-        known = values == values
+        entry, known = entry_of(name), values == values
         told[name] = np.where(known, values, entry.stand_in)
         if entry.flag is not None:
             told[entry.flag] = known.astype(float)
     return told
+
+
+@cache
+def _list_unmeasured(names: tuple[str, ...]) -> frozenset[str]:
+    """Return the names of the numbers that are not always measured."""
+    return frozenset(name for name in names if entry_of(name).stand_in is not None)
 
 
 def is_of_belief(name: str) -> bool:

@@ -117,20 +117,50 @@ def _find_narrowest(
     n_a, n_b = a.shape[1], b.shape[1]
     per_a, per_b = len(b) // max(len(a), 1), len(b) // max(len(radius_b), 1)
     per_first = len(b) // max(len(radius_a), 1)
-    spheres_a, spheres_b = np.empty((5, n_a)), np.empty((5, n_b))
-    bounds = np.empty((n_a, n_b))
+    bounds = Bounds(np.empty((5, n_a)), np.empty((5, n_b)), np.empty((n_a, n_b)))
     for n in range(len(b)):
-        first = a[n // per_a]
-        _bound_capsules(first, radius_a[n // per_first], spheres_a)
-        _bound_capsules(b[n], radius_b[n // per_b], spheres_b)
-        for k in range(n_a):
-            x, y, z, reach = spheres_a[0, k], spheres_a[1, k], spheres_a[2, k], spheres_a[3, k]
-            for m in range(n_b):
-                dx, dy, dz = spheres_b[0, m] - x, spheres_b[1, m] - y, spheres_b[2, m] - z
-                bounds[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - spheres_b[3, m]
-        points[n], gap[n] = 0.0, np.inf
-        if bounds.size:
-            gap[n] = _search_pairs(first, spheres_a[4], b[n], spheres_b[4], bounds, points[n])
+        gap[n] = find_gap(
+            a[n // per_a], radius_a[n // per_first], b[n], radius_b[n // per_b], bounds, points[n]
+        )
+
+
+class Bounds(NamedTuple):
+    """Work arrays of `find_gap`: bounding spheres, and lower bounds of distances."""
+
+    spheres_a: Floats
+    """(5, Ka) bounding spheres of the first set, as `_bound_capsules` computes them."""
+    spheres_b: Floats
+    """(5, Kb) bounding spheres of the second set."""
+    least_m: Floats
+    """(Ka, Kb) lower bounds of the distances between capsules [m]."""
+
+
+@kernel
+def find_gap(
+    a: Capsules, radius_a: Floats, b: Capsules, radius_b: Floats, bounds: Bounds, points: Points3
+) -> float:
+    """Return the smallest distance between two sets of capsules; infinite if a set is empty [m].
+
+    Args:
+        a: (Ka, 2, 3) capsules of the first set [m].
+        radius_a: radii of the first set, as for `_bound_capsules` [m].
+        b: (Kb, 2, 3) capsules of the second set [m].
+        radius_b: radii of the second set [m].
+        bounds: work arrays.
+        points: (2, 3) receives the closest points on the axes [m].
+    """
+    spheres_a, spheres_b, least_m = bounds.spheres_a, bounds.spheres_b, bounds.least_m
+    _bound_capsules(a, radius_a, spheres_a)
+    _bound_capsules(b, radius_b, spheres_b)
+    for k in range(len(a)):
+        x, y, z, reach = spheres_a[0, k], spheres_a[1, k], spheres_a[2, k], spheres_a[3, k]
+        for m in range(len(b)):
+            dx, dy, dz = spheres_b[0, m] - x, spheres_b[1, m] - y, spheres_b[2, m] - z
+            least_m[k, m] = math.sqrt(dx * dx + dy * dy + dz * dz) - reach - spheres_b[3, m]
+    points[:] = 0.0
+    if not least_m.size:
+        return np.inf
+    return _search_pairs(a, spheres_a[4], b, spheres_b[4], least_m, points)
 
 
 @kernel

@@ -18,7 +18,7 @@ that of the quasi-static contact at the robot's own speed.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from hrc_env.core.typing import (
     Velocities3,
 )
 from hrc_env.geometry.chains import capsules, lever, link_frames
-from hrc_env.geometry.distances import closest_parameters, least_separation
+from hrc_env.geometry.distances import Bounds, closest_parameters, find_gap, least_separation
 from hrc_env.geometry.inertia import find_mobility
 from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.geometry.shapes import WIDTH, set_capsules
@@ -317,11 +317,13 @@ def detect_incidents(
     incidents = make_records(Incident, (history.shape[0], history.shape[1]))
     n_steps = paths.robot_world.shape[1]
     took_s = dt_s * (n_steps - 1) / n_steps if n_steps > 1 else np.nan
-    touches = paths.gaps_m <= 0.0
-    first = np.where(touches.any(1), touches.argmax(1), -1)
-    _advance_history(history, incidents, _find_gaps(paths), first, took_s, dt_s)
-    for b, w in np.argwhere(incidents["kind"] >= 0).tolist():
-        touch = _find_touch(paths, b, w, int(first[b, w]))
+    first_touch = np.empty(incidents.shape, np.int64)
+    happened = _advance_history(
+        history, incidents, _get_path_arrays(paths), first_touch, took_s, dt_s
+    )
+    beginning = np.argwhere(incidents["kind"] >= 0).tolist() if happened.contacts else ()
+    for b, w in beginning:
+        touch = _find_touch(paths, b, w, int(first_touch[b, w]))
         region = regions[touch.worker_capsule]
         incidents["region"][b, w] = region
         _measure_contact(incidents, recent, paths, touch, (b, w), took_s)
@@ -332,8 +334,8 @@ def detect_incidents(
         incidents["is_clamped"][b, w] = is_pushed and is_stuck
         _rate_contact(incidents[b, w], touched, _measure_effective_mass(robots, paths, touch, b))
     recent.record(paths, took_s)
-    b, w = np.nonzero(incidents["robot_m_s"] > MOVING_M_S)
-    if len(b):
+    if happened.approaches:
+        b, w = np.nonzero(incidents["robot_m_s"] > MOVING_M_S)
         least_m = protective_distance(
             incidents["robot_m_s"][b, w],
             incidents["worker_m_s"][b, w],
@@ -344,22 +346,30 @@ def detect_incidents(
     return incidents
 
 
-def _find_gaps(paths: Paths) -> Floats:
-    """Return separations (3, B, W) [m]; NaN in environments where all bodies are far apart.
+class PathArrays(NamedTuple):
+    """The arrays of `Paths`, as a tuple for compiled functions."""
 
-    The three rows are the separation at the end of the step, the separation with the robot at its
-    initial pose, and that with the workers at their initial poses.
-    """
-    at_end = paths.gaps_m[:, -1]
-    gaps_m = np.full((3, *at_end.shape), np.nan)
-    near = np.flatnonzero(paths.gaps_m.min((1, 2), initial=np.inf) < WATCHED_M)
-    if len(near):
-        robot = paths.robot_world[near][:, [0, -1]]
-        workers = paths.workers_world[near][:, [-1, 0]]
-        radius_m = np.repeat(paths.worker_radius_m[near, None], 2, axis=1)
-        found = least_separation(robot, paths.robot_radius_m, workers, radius_m)
-        gaps_m[0, near], gaps_m[1:, near] = at_end[near], found.distance_m.swapaxes(0, 1)
-    return gaps_m
+    robot_world: Capsules
+    """(B, T, K, 2, 3) end points of the robot's capsules [m]."""
+    robot_radius_m: Floats
+    """(K,) radii of the robot's capsules [m]."""
+    workers_world: Capsules
+    """(B, T, W, L, 2, 3) end points of the workers' capsules [m]."""
+    worker_radius_m: Floats
+    """(B, W, L) radii of the workers' capsules [m]."""
+    gaps_m: Floats
+    """(B, T, W) separations between robot and workers [m]."""
+
+
+def _get_path_arrays(paths: Paths) -> PathArrays:
+    """Return the arrays of paths, copied where they are not contiguous."""
+    return PathArrays(
+        robot_world=np.ascontiguousarray(paths.robot_world),
+        robot_radius_m=np.ascontiguousarray(paths.robot_radius_m),
+        workers_world=np.ascontiguousarray(paths.workers_world),
+        worker_radius_m=np.ascontiguousarray(paths.worker_radius_m),
+        gaps_m=np.ascontiguousarray(paths.gaps_m),
+    )
 
 
 def _find_touch(paths: Paths, b: int, w: int, t: int) -> Touch:
@@ -482,48 +492,103 @@ def _rate_contact(incident: Any, region: BodyRegion, robot_kg: float) -> None:
     incident["severity"] = within if region.is_touched else NEVER
 
 
-@kernel
+class Happened(NamedTuple):
+    """Events of a step in any of the environments."""
+
+    contacts: bool
+    """Whether a contact begins."""
+    approaches: bool
+    """Whether a robot moves towards a worker."""
+
+
+class DirectedGaps(NamedTuple):
+    """Separations of a robot and a worker near the end of a step."""
+
+    end_m: float
+    """Separation at the end of the step [m]."""
+    robot_before_m: float
+    """Separation with the robot at its initial pose [m]."""
+    worker_before_m: float
+    """Separation with the worker at the initial pose [m]."""
+
+
+@kernel(makes_arrays=True)
 def _advance_history(
     history: Records2[WorkerHistory],
     incidents: Records2[Incident],
-    gaps_m: Floats,
+    paths: PathArrays,
     first_touch: Ints,
     took_s: float,
     dt_s: float,
-) -> None:
+) -> Happened:
     """Compute the incidents of a step except the properties of contacts; advance the histories.
 
     Args:
         history: (B, W) histories, changed in place.
         incidents: (B, W) receives the incidents.
-        gaps_m: (3, B, W) separations, as `_find_gaps` returns them [m].
-        first_touch: (B, W) physics step of the first touch; -1 for none.
+        paths: capsules of the bodies at the physics steps.
+        first_touch: (B, W) receives the physics step of the first touch; -1 for none.
         took_s: time between the first and the last physics step [s].
         dt_s: duration of the step [s].
     """
+    n_robot, n_worker = paths.robot_world.shape[2], paths.workers_world.shape[3]
+    bounds = Bounds(np.empty((5, n_robot)), np.empty((5, n_worker)), np.empty((n_robot, n_worker)))
+    points, contacts, approaches = np.empty((2, 3)), False, False
     for b in range(history.shape[0]):
+        is_near = False
+        for gap_m in paths.gaps_m[b].flat:
+            is_near |= gap_m < WATCHED_M
         for w in range(history.shape[1]):
-            past, now, gap = history[b, w], incidents[b, w], gaps_m[0, b, w]
+            first_touch[b, w] = _find_first_touch(paths.gaps_m[b, :, w])
+            gaps = DirectedGaps(np.nan, np.nan, np.nan)
+            if is_near:
+                gaps = _direct_gaps(paths, b, w, bounds, points)
+            past, now, gap = history[b, w], incidents[b, w], gaps.end_m
             now.separation_m, now.region, now.severity, now.is_separation_violated = (
                 gap,
                 -1,
                 0,
                 False,
             )
-            now.robot_m_s = (gaps_m[1, b, w] - gap) / took_s
-            now.worker_m_s = (gaps_m[2, b, w] - gap) / took_s
+            now.robot_m_s = (gaps.robot_before_m - gap) / took_s
+            now.worker_m_s = (gaps.worker_before_m - gap) / took_s
+            approaches |= now.robot_m_s > MOVING_M_S
             is_touching = first_touch[b, w] >= 0
             now.kind, now.force_ratio, now.is_clamped = -1, np.nan, False
             now.robot_speed_m_s = now.closing_speed_m_s = np.nan
             now.recent_robot_speed_m_s = now.recent_closing_speed_m_s = np.nan
             if is_touching and past.since_s >= CONTACT_GAP_S:
-                now.kind = STANDING  # `_measure_contact` finds the kind
+                now.kind, contacts = STANDING, True  # `_measure_contact` finds the kind
             past.since_s = 0.0 if is_touching else past.since_s + dt_s
             is_calm, is_apart = past.since_s >= CONTACT_GAP_S, not gap < CLEAR_M
             now.is_near_miss = past.is_close and is_apart and is_calm
             past.near_misses += now.is_near_miss
             begins = past.is_close or (gap < NEAR_MISS_M and is_calm)
             past.is_close = begins and not (is_touching or is_apart)
+    return Happened(contacts, approaches)
+
+
+@kernel
+def _find_first_touch(gaps_m: Floats) -> int:
+    """Return the first physics step with a separation (T,) of at most 0 [m]; -1 for none."""
+    for t in range(len(gaps_m)):
+        if gaps_m[t] <= 0.0:
+            return t
+    return -1
+
+
+@kernel
+def _direct_gaps(
+    paths: PathArrays, b: int, w: int, bounds: Bounds, points: Points3
+) -> DirectedGaps:
+    """Return the separations of robot `b` and worker `w`; the other arguments are work arrays."""
+    robot, worker, last = paths.robot_world[b], paths.workers_world[b], len(paths.gaps_m[b]) - 1
+    radius_m, worker_radius_m = paths.robot_radius_m, paths.worker_radius_m[b, w]
+    return DirectedGaps(
+        paths.gaps_m[b, last, w],
+        find_gap(robot[0], radius_m, worker[last, w], worker_radius_m, bounds, points),
+        find_gap(robot[last], radius_m, worker[0, w], worker_radius_m, bounds, points),
+    )
 
 
 def summarize(incidents: Records2[Incident], history: Records2[WorkerHistory]) -> Records1[Summary]:

@@ -125,13 +125,13 @@ def monitor(
         P: (C, 3, 4) projections of the calibrated cameras.
         axes: (C, 3) principal point and focal length [px].
     """
-    state["updates"][ids] += 1
-    due = np.flatnonzero(state["updates"][ids, 0] % EVERY == 0)
-    if len(due) == 0:
+    due = np.empty(len(ids), np.int64)
+    n_due = _list_due(state, ids, due)
+    if n_due == 0:
         return
     sample_views(
         state,
-        due,
+        due[:n_due],
         ids,
         get_keypoint_arrays(keypoints),
         age_s,
@@ -139,6 +139,19 @@ def monitor(
         P,
         axes,
     )
+
+
+@kernel
+def _list_due(state: Records2[MonitoredCamera], ids: Ints, due: Ints) -> int:
+    """Count an update, fill in the rows (b,) with a due sample, and return their number."""
+    n_due = 0
+    for row in range(len(ids)):
+        for c in range(state.shape[1]):
+            state[ids[row], c].updates += 1
+        if state[ids[row], 0].updates % EVERY == 0:
+            due[n_due] = row
+            n_due += 1
+    return n_due
 
 
 @kernel(makes_arrays=True)

@@ -35,9 +35,11 @@ class InfoTable:
 
     def arrays(self, mask: Bools) -> InfoDict:
         """Return values and masks by name. Only the environments in the mask (B,) have values."""
-        infos = InfoDict()
+        infos, is_whole = InfoDict(), bool(mask.all())
         for name, values in publish(self.values).items():
-            infos[name] = np.where(mask, values, np.zeros_like(values))
+            infos[name] = (
+                values.copy() if is_whole else np.where(mask, values, np.zeros_like(values))
+            )
             infos[f"_{name}"] = mask.copy()
         return infos
 
@@ -50,6 +52,8 @@ def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
         ids: indices of the environments in the result.
         batch: number of all environments, B.
     """
+    if len(result.reward) == batch:
+        return InfoTable({name: np.array(values) for name, values in result.info.items()})
     table = InfoTable({name: _fill(batch, values) for name, values in result.info.items()})
     table.write(ids, result)
     return table
