@@ -489,9 +489,9 @@ class Simulation(Stateful):
         """Expose the cameras, update the estimates, measure objects, and return the belief."""
         ids, everyone = truth.ids, truth.ids is self._everyone
         self._expose(truth)
-        sensor, tracker = (
-            select_streams(self.streams[name], ids) for name in ("sensor", "tracker")
-        )
+        sensor, tracker = self.streams["sensor"], self.streams["tracker"]
+        if not everyone:
+            sensor, tracker = select_streams(sensor, ids), select_streams(tracker, ids)
         estimate = self.pipeline.perceive(ids, sensor, tracker)
         later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
         estimates = (estimate, *later)

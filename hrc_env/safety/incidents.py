@@ -697,7 +697,8 @@ class IncidentMonitor(Stateful):
         found = detect_incidents(
             self.history, self.recent, paths, self.regions, robots, stop_s, self.dt_s
         )
-        self.last_kind[:] = np.where(found["kind"] >= 0, found["kind"], self.last_kind)
+        kind = found["kind"]
+        np.copyto(self.last_kind, kind, where=kind >= 0)
         return found
 
     def find_pushed(self, world: World, paths: Paths, commands: JointVelocities) -> Bools:
@@ -714,9 +715,9 @@ class IncidentMonitor(Stateful):
             commands: (B, N) commanded joint velocities in the step [rad/s], or [m/s] for slides.
         """
         was_hit = (self.history["since_s"] < CONTACT_GAP_S) & (self.last_kind != TOWARDS)
-        ids = np.flatnonzero(was_hit.any(1))
-        if not len(ids):
+        if not was_hit.any():
             return was_hit
+        ids = np.flatnonzero(was_hit.any(1))
         limit = self.model.fastest_rad_s
         q, velocities = world.robot.q[ids], np.clip(np.nan_to_num(commands[ids]), -limit, limit)
         ahead = np.stack([q, q + velocities * self.dt_s], axis=1)

@@ -25,7 +25,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import Stateful, change_fields, rows, write_rows
+from hrc_env.core.batching import Stateful, change_fields, write_rows
 from hrc_env.core.declared import Records1, Records2, Records3, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -232,7 +232,7 @@ class Presence(Stateful):
 
     def vacancy(self, ids: Ints) -> Vacancy:
         """Return the state of the floor of environments `ids`."""
-        others = rows(self.others, ids)
+        others = Others(self.others.hips_world[ids], self.others.age_s[ids])
         return Vacancy(self.coverage, self.levels[ids], self.age_s[ids], others)
 
     def find_contradicting_cameras(self, ids: Ints) -> Bools:
