@@ -42,7 +42,7 @@ STAND_SHARE = 0.994
 """Height of the hip in standing with slightly bent knees, as a fraction of leg length."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Anatomy:
     """Constants of one body, or of N bodies along a leading axis."""
 

@@ -6,13 +6,16 @@ workplace chooses another one of the same kind, or waits.
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import decision as dc
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
+from hrc_env.motion.anatomy import Anatomy
 from hrc_env.motion.blending import join, leave, place_standing
 from hrc_env.motion.decision import Decision, MotionState, take_first_place
 from hrc_env.motion.reaches import LEAD_S, find_next_reach
@@ -94,14 +97,8 @@ def begin_episode(
         activities: first activities of the first workers, used if workplaces for them are free.
     """
     mind, workers = state.mind_of(b), state.workers[b]
-    workers[...] = np.zeros((), st.WORKER)
+    workers[...] = _make_fresh_workers(mind.anatomy)[bodies]
     workers["is_present"] = np.arange(len(workers)) < n_present
-    bones, workers["body"] = mind.anatomy, bodies
-    workers["lengths"], workers["trunk_ends"] = bones.lengths[bodies], bones.trunk_ends[bodies]
-    workers["bones"], workers["frame"] = bones.offset[bodies], bones.frame[bodies]
-    workers["reacts_at_s"] = workers["robot_world"] = workers["duration_s"] = np.inf
-    workers["place"][:, :2] = np.inf
-    workers["pace"] = workers["wanted_pace"] = 1.0
     everyone = [
         Decision(
             mind, workers, w, draws[w, 0], 0.0, state.loads[b], script=state.scripts.get(b, ())
@@ -130,6 +127,19 @@ def begin_episode(
         if scripted:
             continue
         decision.worker.time_s = math.floor(1e6 * share * float(decision.worker.duration_s)) * 1e-6
+
+
+@lru_cache(maxsize=8)
+def _make_fresh_workers(bones: Anatomy) -> Records1[st.Worker]:
+    """Return a worker of each body (N,), without an activity."""
+    fresh = np.zeros(len(bones.lengths), st.WORKER)
+    fresh["body"] = np.arange(len(fresh))
+    fresh["lengths"], fresh["trunk_ends"] = bones.lengths, bones.trunk_ends
+    fresh["bones"], fresh["frame"] = bones.offset, bones.frame
+    fresh["reacts_at_s"] = fresh["robot_world"] = fresh["duration_s"] = np.inf
+    fresh["place"][:, :2] = np.inf
+    fresh["pace"] = fresh["wanted_pace"] = 1.0
+    return fresh
 
 
 def choose_activity(decision: Decision) -> Action:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hrc_env.core.declared import Records1, dtype_of
 from hrc_env.core.errors import make_unknown_name_error
+from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.going import CART, WHEELBARROW
@@ -129,13 +130,23 @@ def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Gen
     """
     loads[...] = np.zeros((), LOAD)
     loads[: len(first)] = first
-    off = 2.0 * rng.random((len(first), 3)) - 1.0
-    for row, (x, y, turn) in zip(loads, off.tolist(), strict=False):
-        if row.shown[0] not in WHEELED:
-            row.pose[:2] += MOVED_M * x, MOVED_M * y
-            row.pose[3] += TURNED_RAD * turn
-        half = 0.5 * row.pose[3]
-        row.shown[1:] = *row.pose[:3], math.cos(half), 0.0, 0.0, math.sin(half)
+    _displace_loads(loads, 2.0 * rng.random((len(first), 3)) - 1.0)
+
+
+@kernel
+def _displace_loads(loads: Records1[Load], off: Floats) -> None:
+    """Displace the first loads by random numbers (L, 3) in [-1, 1), and set what is shown."""
+    for k in range(len(off)):
+        load = loads[k]
+        kind, pose, shown = load.shown[0], load.pose, load.shown
+        if kind != CART and kind != WHEELBARROW:
+            pose[0] += MOVED_M * off[k, 0]
+            pose[1] += MOVED_M * off[k, 1]
+            pose[3] += TURNED_RAD * off[k, 2]
+        half = 0.5 * pose[3]
+        for i in range(3):
+            shown[1 + i] = pose[i]
+        shown[4], shown[5], shown[6], shown[7] = math.cos(half), 0.0, 0.0, math.sin(half)
 
 
 def find_rest_pose(
