@@ -13,8 +13,10 @@ from figures import Figures, collect, write
 
 from hrc_env.perception.weights import fetch_weights
 from hrc_env.registration import import_files
+from hrc_env.vector import options
 from tests.registrations import registrations_restored
 
+options.MIN_PER_THREAD = 1  # small batches of tests have as many threads as they ask for
 SLOW = {"process", "pixels", "end_to_end"}
 """Fixtures that take their time: `make test` leaves out who asks for one. `end_to_end` is a whole
 run of an experiment, of which each has its own."""

@@ -40,11 +40,11 @@ from hrc_env.vector.options import (
     MAX_ENVS,
     OF_VECTORS,
     count_elapsed_steps,
+    count_shards,
     parse_autoreset,
     parse_branch_seeds,
     parse_seeds,
     parse_sources,
-    parse_threads,
     parse_time_limit,
     read_options,
     split_options,
@@ -87,7 +87,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         max_episode_steps: time limit [control steps]; None for the task's limit, -1 for no limit.
         autoreset_mode: when an environment is reset after the end of an episode: in the next step
             (the default), in the same step, or never ("Disabled").
-        num_threads: number of threads that share the environments; None for all cores.
+        num_threads: maximum number of threads that share the environments; None for all cores.
+            Each of them steps at least `options.MIN_PER_THREAD` environments.
         arguments: fields of `EnvConfig`. `perception` is "keypoints" (the default), "truth" or
             "none", because images are not rendered in batches. If the render mode has the suffix
             "_list", `render` returns the pictures of all steps since the last `render` or the start
@@ -129,7 +130,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         rehearse(settings)
-        n_shards = min(parse_threads(num_threads), self.num_envs)
+        n_shards = count_shards(self.num_envs, num_threads)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
         self.pictures = Pictures(self.shards, self.render_mode, self._size, self._shown)
         self.single_observation_space, self.single_action_space = make_spaces(self.shards.first)

@@ -24,6 +24,8 @@ from hrc_env.reset_options import ResetOptions, named_options
 MAX_ENVS = 16_384
 """Maximum number of environments. More environments need gigabytes of memory without being
 faster."""
+MIN_PER_THREAD = 32
+"""Minimum number of environments for which a further thread saves time."""
 ALONE = ("steps_left", "elapsed_steps")
 """Options of a reset that may differ between environments, in addition to the fields of
 `ResetOptions`."""
@@ -62,6 +64,15 @@ def parse_threads(num_threads: int | None) -> int:
             stacklevel=3,
         )
     return n_threads
+
+
+def count_shards(num_envs: int, num_threads: int | None) -> int:
+    """Return the number of simulations, one per thread, that share the environments.
+
+    Every simulation runs the Python code of a step, one after the other, so that a few environments
+    are faster in a single one.
+    """
+    return min(parse_threads(num_threads), max(num_envs // MIN_PER_THREAD, 1))
 
 
 def parse_seeds(

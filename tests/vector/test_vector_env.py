@@ -257,3 +257,13 @@ def test_pixels_are_processes(pixels):
     assert truncated.all()
     assert infos["_final_obs"].all()
     env.close()
+
+
+def test_a_few_environments_use_one_thread(process):
+    """They are slower in several threads, each of which runs the Python code of a step."""
+    done = process(
+        "-W", "ignore", "-c",
+        "from hrc_env.vector.options import count_shards\n"
+        "print([count_shards(n, 2) for n in (1, 16, 63, 64, 1000)], count_shards(64, 1))",
+    )  # fmt: skip
+    assert done.stdout.split("\n")[0] == "[1, 1, 1, 2, 2] 1", done.stderr
