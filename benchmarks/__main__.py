@@ -1,7 +1,8 @@
 """The command `python -m benchmarks`.
 
-It runs the benchmarks of the estimators, the detector, the speed, the motion of workers, rare
-contacts, people searched for contacts and the cost, and renders a gallery.
+It runs the benchmarks of the estimators, the detector, the speed (also beside other environments),
+the motion of workers, rare contacts, people searched for contacts and the cost, and renders a
+gallery.
 """
 
 import sys
@@ -127,6 +128,27 @@ class SpeedArguments(BenchArguments):
 
         config = QUICK if self.quick else SpeedBench()
         return self.show(override(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
+
+
+@dataclass(frozen=True)
+class PeersArguments(BenchArguments):
+    """Measure steps per second of processor time beside other environments, and the first start.
+
+    EnvPool is measured if it is installed (the extra "peers").
+    """
+
+    stays = "it measures time, which other processes would disturb"
+    out: Path = Path("out/bench_peers")
+    rounds: int | None = None
+    """Number of rounds, of which the median is reported (default: 7, quick: 1)."""
+
+    def run(self) -> int:
+        """Run the benchmark and print its tables; return the exit status."""
+        check_at_least("--rounds", self.rounds, 1)
+        from benchmarks.speed.peers import QUICK, PeersBench
+
+        config = QUICK if self.quick else PeersBench()
+        return self.show(override(config, n_rounds=self.rounds))
 
 
 @dataclass(frozen=True)
@@ -298,8 +320,8 @@ class Gallery:
 class Benchmarks:
     """Run a benchmark of estimators, detector, environment or workers, or render a gallery.
 
-    The benchmarks are tracking, perception, speed, motion, rare, adversary, ranks and budgets.
-    Each takes --quick (minutes instead of hours) and --out DIR, a folder for report.html,
+    The benchmarks are tracking, perception, speed, peers, motion, rare, adversary, ranks and
+    budgets. Each takes --quick (minutes instead of hours) and --out DIR, a folder for report.html,
     results.json and figures. `tracking --help`, for example, describes the other options.
     """
 
@@ -307,6 +329,7 @@ class Benchmarks:
         Annotated[TrackingArguments, tyro.conf.subcommand("tracking")]
         | Annotated[PerceptionArguments, tyro.conf.subcommand("perception")]
         | Annotated[SpeedArguments, tyro.conf.subcommand("speed")]
+        | Annotated[PeersArguments, tyro.conf.subcommand("peers")]
         | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
         | Annotated[RareArguments, tyro.conf.subcommand("rare")]
         | Annotated[AdversaryArguments, tyro.conf.subcommand("adversary")]

@@ -142,6 +142,10 @@ STUDIES: dict[str, Study] = {
             BENCH + "speed --task every", 2, KEYPOINTS, ("speed_tasks",), is_resumable=False,
             made=ExperimentSource("benchmarks.speed.bench", "SpeedBench", {"task": "every"}),
         ),
+        "peers": Command(
+            BENCH + "peers", 6, PIXELS, ("speed_peers", "first_start"), is_resumable=False,
+            made=ExperimentSource("benchmarks.speed.peers", "PeersBench"),
+        ),
         "cluster": Command(
             "python -m benchmarks.cluster", 8, (*KEYPOINTS, "agents"), ("cluster",),
             {"ray_metrics.png": "metrics.png"}, is_resumable=False,

@@ -28,6 +28,7 @@ def test_an_unknown_bench_is_answered_with_the_known_ones():
         (BENCHMARKS, ["tracking", "--quick", "--out", "{}"]),
         (BENCHMARKS, ["perception", "--quick", "--out", "{}"]),
         (BENCHMARKS, ["speed", "--quick", "--out", "{}"]),
+        (BENCHMARKS, ["peers", "--quick", "--out", "{}"]),
         (BENCHMARKS, ["motion", "--quick", "--out", "{}/x/y"]),
         (BENCHMARKS, ["gallery", "--out", "{}"]),
         (CALIBRATE, ["--quick", "--out", "{}/keypoints.json"]),
@@ -48,6 +49,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(script, words
         (BENCHMARKS, ["motion", "--seeds", "0"]),
         (BENCHMARKS, ["tracking", "--engine", "processes", "--workers", "0"]),
         (BENCHMARKS, ["speed", "--rounds", "0"]),
+        (BENCHMARKS, ["peers", "--rounds", "0"]),
         (CALIBRATE, ["--rounds", "-1"]),
     ],
 )
