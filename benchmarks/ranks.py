@@ -12,7 +12,7 @@ steps near a worker and steps in contact, is shown for comparison.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -196,7 +196,8 @@ class RanksBench:
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the rank correlations and of the policies."""
-        return (make_table(self.seeds), *self.study.shown_tables())
+        policies = (replace(each, name="policies") for each in self.study.shown_tables())
+        return (make_table(self.seeds), *policies)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Return the report with the tables."""

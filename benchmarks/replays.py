@@ -121,6 +121,9 @@ REPLAYS: dict[str, Replay] = {
     "under_shield": _replay_command("under_shield", learnt=("",)),
     "kept": _replay_command("kept", row_words=3),
     "budgets": _replay_command("budgets", row_words=2),
+    "ranks": _replay_command("ranks"),
+    "rare": _replay_command("rare"),
+    "adversary": _replay_command("adversary", row_words=2),
     "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(_replay_price, row_words=2),
 }

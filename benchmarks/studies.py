@@ -227,13 +227,27 @@ STUDIES: dict[str, Study] = {
     "shield_and_price": Study({
         "under_shield": Command(
             "python -m benchmarks.under_shield", 560, (*KEYPOINTS, "shield", "agents"),
-            (),  # its two tables are listed with the results of its first run
+            (),  # as above
             quick="--quick --seeds 0 --learners qp bare", is_release=True,
             made=ExperimentSource("benchmarks.under_shield", "make_default", needs_out=True),
         ),
         "shielded": Command(
             "python -m benchmarks.shielded", 6, (*KEYPOINTS, "shield", "agents"), ("shielded",),
             made=ExperimentSource("benchmarks.shielded", "STUDY"),
+        ),
+        "ranks": Command(
+            BENCH + "ranks", 12, (*KEYPOINTS, "shield", "agents"), ("ranks", "policies"),
+            made=ExperimentSource("benchmarks.ranks", "RanksBench"),
+        ),
+        "rare": Command(
+            BENCH + "rare", 30, (*KEYPOINTS, "shield", "agents"),
+            (),  # here and below, tables are listed with the results of the first run
+            is_release=True,
+            made=ExperimentSource("benchmarks.rare.bench", "RareBench"),
+        ),
+        "adversary": Command(
+            BENCH + "adversary", 30, (*KEYPOINTS, "shield", "agents"), (), is_release=True,
+            made=ExperimentSource("benchmarks.adversary.bench", "AdversaryBench"),
         ),
         "price": Command(
             EXPERIMENT + "price", 135, PRICE, ("price", "worth"), {"price.png": "frontier.png"},

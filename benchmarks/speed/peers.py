@@ -57,7 +57,7 @@ PEERS = Table(
     ROWS,
     (
         Column("steps_per_cpu_s.{}", "environment steps [1/s]", 0),
-        Column("of_reacher.{}", f"of {PEER}", 3),
+        Column("of_reacher.{}", f"of {PEER}", 4),
     ),
     ("environment", "batch"),
     "Random actions; resets are included and every info is read. Processor time of all threads. "

@@ -280,7 +280,7 @@ def test_ten_studies_take_three_and_a_half_hours_without_trainings():
     assert sum(study.minutes for study in STUDIES.values()) <= 3.5 * 60
     assert len(COMMANDS) == sum(len(study.commands) for study in STUDIES.values())
     trained = {name for name, command in COMMANDS.items() if command.is_release}
-    assert trained == {"learners", "limited", "price", "under_shield"}
+    assert trained == {"learners", "limited", "price", "under_shield", "rare", "adversary"}
 
 
 def test_a_name_of_a_study_stands_for_all_its_commands():
