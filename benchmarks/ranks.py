@@ -7,7 +7,8 @@ workers with the behaviour `unaware`. They are ranked by the mean cost of an epi
 hour in which the robot moves towards the worker, and by approaches an hour (steps in which it gets
 nearer than `CostConfig.proximity_m` at more than 0.05 m/s). Spearman's rank correlation has a 95 %
 bootstrap interval over seeds, which are resampled for all policies together; as resampling adds
-noise to both ranks, the interval is shifted towards 0. The former default of the cost, the sum of
+noise to both ranks, the resamples are shifted towards 0, and the interval is extended to the
+correlation itself. The former default of the cost, the sum of
 steps near a worker and steps in contact, is shown for comparison.
 """
 
@@ -236,11 +237,18 @@ def correlate_ranks(policies: Sequence[Episodes]) -> dict[str, Metric]:
         for cost in COSTS
         for rate_name in REFERENCES
     }
+    found = {name: _extend(each) for name, each in found.items()}
     for rate_name in REFERENCES:
         found[f"rank.perfect.{rate_name}"] = bootstrap(
             lambda weights, y=values[rate_name]: find_greatest_spearman(weights @ y.T), n_seeds, "1"
         )
     return found
+
+
+def _extend(metric: Metric) -> Metric:
+    """Return a metric with an interval that contains its value."""
+    low, high = min(metric.low, metric.value), max(metric.high, metric.value)
+    return replace(metric, low=low, high=high)
 
 
 def compute_spearman(a: Floats, b: Floats) -> Floats:

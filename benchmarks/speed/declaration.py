@@ -29,6 +29,7 @@ TASKS = Table(
     ("task",),
     "`keypoints`, one worker, 64 environments on 2 threads, random actions; tasks take turns of 20 "
     "steps. Median, smallest and largest value of the rounds.",
+    fewest=1,
 )
 
 
@@ -63,6 +64,7 @@ def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Ta
         f"{{n[env_steps_per_s.{REACHER}.{SINGLE}]}} rounds in which configurations take turns. "
         f"`{SINGLE}` is an environment of `gymnasium.make`, the others are batches. The machine is "
         "shared: compare ratios.",
+        fewest=1,
     )
 
 

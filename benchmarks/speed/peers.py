@@ -63,6 +63,7 @@ PEERS = Table(
     "Random actions; resets are included and every info is read. Processor time of all threads. "
     f"Median, smallest and largest value of {{n[of_reacher.reacher]}} rounds in which environments "
     f"take turns; ratios are within a round. {ROBOSUITE}",
+    fewest=1,
 )
 STARTS = {"empty": ("nothing compiled",), "filled": ("kernels compiled before",)}
 FIRST_START = Table(
@@ -73,6 +74,7 @@ FIRST_START = Table(
     ("kernels",),
     f"`make`, `reset` and one `step` of `{OURS}` at `keypoints` in a new process, with the "
     "processes that compile kernels. Median, smallest and largest value.",
+    fewest=1,
 )
 START = f"""
 import resource, time

@@ -104,7 +104,8 @@ class Table:
     of counts of rare events: a bootstrap over the episodes of one policy does not contain the
     variation between trainings (`hrc_env.evaluation.intervals.estimate_run_iqm`)."""
     fewest: int = MIN_SEEDS
-    """Smallest number of seeds with a bootstrap interval; `MIN_RUNS` if a seed is a training."""
+    """Smallest number of seeds with a bootstrap interval; `MIN_RUNS` if a seed is a training, 1 if
+    the columns show ranges of repeated measurements instead of intervals."""
 
     def check(self, known: Collection[str]) -> None:
         """Raise `ConfigError` if a row has the wrong number of cells or a column has no metric.

@@ -115,3 +115,22 @@ def test_a_budget_is_above_the_cost_of_a_careful_agent_and_below_that_of_the_car
     assert metrics[f"{task}.budget"].value == COST_LIMITS[task]
     costs = [metrics[f"{task}.{name}.cost"] for name in budgets.BEHAVIOURS]
     assert min(cost.value for cost in costs) <= COST_LIMITS[task] <= max(x.high for x in costs)
+
+
+def test_an_interval_contains_its_correlation():
+    """Resamples add noise to the ranks of policies that hardly differ, and correlate less."""
+    rng = np.random.default_rng(0)
+
+    def draw(k: int) -> np.ndarray:
+        noise = rng.normal(size=16)
+        return noise - noise.mean() + 1e-3 * k
+
+    episodes = [
+        [{**dict.fromkeys(STATISTICS, 0.0), "cost": cost, "contacts_towards": towards}
+         for cost, towards in zip(draw(k), draw(k), strict=True)]
+        for k in range(20)
+    ]  # fmt: skip
+    found = correlate_ranks(episodes)["rank.cost.towards_per_hour"]
+    assert found.value == pytest.approx(1.0)
+    assert found.low < 0.5
+    assert found.high == found.value
