@@ -146,6 +146,11 @@ STUDIES: dict[str, Study] = {
             BENCH + "peers", 6, PIXELS, ("speed_peers", "first_start"), is_resumable=False,
             made=ExperimentSource("benchmarks.speed.peers", "PeersBench"),
         ),
+        "pixels": Command(
+            "python -m benchmarks.speed.pixels", 8, PIXELS, ("pixels_detector",),
+            quick="--episodes 1 --steps 20", is_resumable=False,
+            tables_in="benchmarks.speed.pixels",
+        ),
         "cluster": Command(
             "python -m benchmarks.cluster", 8, (*KEYPOINTS, "agents"), ("cluster",),
             {"ray_metrics.png": "metrics.png"}, is_resumable=False,

@@ -23,7 +23,7 @@ INSTALL = 'pip install "hrc_env[openvino]"'
 """Command that installs OpenVINO."""
 TIME_SHARE = 0.74
 """Time of a step at level `pixels` with OpenVINO in bf16, as a share of that with LiteRT
-(benchmarks/speed/pixels.json)."""
+(docs/results/whole/pixels.json)."""
 
 
 def describe_gain() -> str:

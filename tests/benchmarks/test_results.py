@@ -251,7 +251,7 @@ def test_a_study_names_the_subsystems_that_its_parts_are_keyed_by():
 
 def test_every_study_can_be_replayed_or_keeps_no_parts():
     assert COMMANDS.keys() - REPLAYS.keys() == {
-        "speed", "speed_tasks", "peers", "cluster", "pictures",
+        "speed", "speed_tasks", "peers", "pixels", "cluster", "pictures",
     }  # fmt: skip
     assert REPLAYS.keys() <= COMMANDS.keys()
 
