@@ -197,7 +197,7 @@ class RanksBench:
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the rank correlations and of the policies."""
-        policies = (replace(each, name="policies") for each in self.study.shown_tables())
+        policies = (replace(each, name="ranks_policies") for each in self.study.shown_tables())
         return (make_table(self.seeds), *policies)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:

@@ -241,7 +241,7 @@ STUDIES: dict[str, Study] = {
             made=ExperimentSource("benchmarks.shielded", "STUDY"),
         ),
         "ranks": Command(
-            BENCH + "ranks", 12, (*KEYPOINTS, "shield", "agents"), ("ranks", "policies"),
+            BENCH + "ranks", 12, (*KEYPOINTS, "shield", "agents"), ("ranks", "ranks_policies"),
             made=ExperimentSource("benchmarks.ranks", "RanksBench"),
         ),
         "rare": Command(

@@ -350,22 +350,23 @@ def entry_of(name: str) -> Entry:
 def publish(info: Info) -> Info:
     """Return numbers (B,) without NaN, and the flags that state whether they were measured."""
     told: Info = {}
-    may_be_unmeasured = _list_unmeasured(tuple(info))
+    stand_ins = _find_stand_ins(tuple(info))
     for name, values in info.items():
-        if name not in may_be_unmeasured:
+        if name not in stand_ins:
             told[name] = values
             continue
-        entry, known = entry_of(name), values == values
-        told[name] = np.where(known, values, entry.stand_in)
-        if entry.flag is not None:
-            told[entry.flag] = known.astype(float)
+        flag, known = entry_of(name).flag, values == values
+        told[name] = np.where(known, values, stand_ins[name])
+        if flag is not None:
+            told[flag] = known.astype(float)
     return told
 
 
 @cache
-def _list_unmeasured(names: tuple[str, ...]) -> frozenset[str]:
-    """Return the names of the numbers that are not always measured."""
-    return frozenset(name for name in names if entry_of(name).stand_in is not None)
+def _find_stand_ins(names: tuple[str, ...]) -> dict[str, float]:
+    """Return the values that are published for numbers that were not measured, by name."""
+    found = {name: entry_of(name).stand_in for name in names}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def is_of_belief(name: str) -> bool:

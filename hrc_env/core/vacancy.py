@@ -45,7 +45,7 @@ class Others:
     @property
     def any(self) -> Bools:
         """Whether there are more people than slots (B,)."""
-        return np.isfinite(self.age_s).any(-1)
+        return np.asarray(np.isfinite(self.age_s).any(-1))
 
 
 def no_others(batch: int) -> Others:

@@ -44,6 +44,17 @@ class ClosestPoints(NamedTuple):
     """Parameter of the point on the second segment, from 0 at the start to 1 at the end."""
 
 
+class Bounds(NamedTuple):
+    """Work arrays of `find_gap`: bounding spheres, and lower bounds of distances."""
+
+    spheres_a: Floats
+    """(5, Ka) bounding spheres of the first set, as `_bound_capsules` computes them."""
+    spheres_b: Floats
+    """(5, Kb) bounding spheres of the second set."""
+    least_m: Floats
+    """(Ka, Kb) lower bounds of the distances between capsules [m]."""
+
+
 def least_separation(
     capsules_a: Capsules, radius_a_m: Floats, capsules_b: Capsules, radius_b_m: Floats
 ) -> Separation:
@@ -122,17 +133,6 @@ def _find_narrowest(
         gap[n] = find_gap(
             a[n // per_a], radius_a[n // per_first], b[n], radius_b[n // per_b], bounds, points[n]
         )
-
-
-class Bounds(NamedTuple):
-    """Work arrays of `find_gap`: bounding spheres, and lower bounds of distances."""
-
-    spheres_a: Floats
-    """(5, Ka) bounding spheres of the first set, as `_bound_capsules` computes them."""
-    spheres_b: Floats
-    """(5, Kb) bounding spheres of the second set."""
-    least_m: Floats
-    """(Ka, Kb) lower bounds of the distances between capsules [m]."""
 
 
 @kernel

@@ -21,7 +21,7 @@ Network: TypeAlias = Callable[[Tensor], list[Tensor]]
 """Function from an image (H, W, 3) to copies of the requested outputs. It is not thread-safe."""
 INSTALL = 'pip install "hrc_env[openvino]"'
 """Command that installs OpenVINO."""
-TIME_SHARE = 0.74
+TIME_SHARE = 0.72
 """Time of a step at level `pixels` with OpenVINO in bf16, as a share of that with LiteRT
 (docs/results/whole/pixels.json)."""
 

@@ -188,6 +188,21 @@ class Paths:
     """Separations between robot and workers (B, T, W) [m]."""
 
 
+class PathArrays(NamedTuple):
+    """The arrays of `Paths`, as a tuple for compiled functions."""
+
+    robot_world: Capsules
+    """(B, T, K, 2, 3) end points of the robot's capsules [m]."""
+    robot_radius_m: Floats
+    """(K,) radii of the robot's capsules [m]."""
+    workers_world: Capsules
+    """(B, T, W, L, 2, 3) end points of the workers' capsules [m]."""
+    worker_radius_m: Floats
+    """(B, W, L) radii of the workers' capsules [m]."""
+    gaps_m: Floats
+    """(B, T, W) separations between robot and workers [m]."""
+
+
 @dataclass(frozen=True, slots=True)
 class RecentMotion:
     """Velocities of capsules in the last `N_RECENT` control steps, as a ring in each environment.
@@ -247,6 +262,26 @@ class TouchingRobots:
     """Joint positions (B, N) at the end of the step [rad], or [m] for slides."""
     load_kg: Floats
     """Mass of the load of each robot (B,) [kg]."""
+
+
+class Happened(NamedTuple):
+    """Events of a step in any of the environments."""
+
+    contacts: bool
+    """Whether a contact begins."""
+    approaches: bool
+    """Whether a robot moves towards a worker."""
+
+
+class DirectedGaps(NamedTuple):
+    """Separations of a robot and a worker near the end of a step."""
+
+    end_m: float
+    """Separation at the end of the step [m]."""
+    robot_before_m: float
+    """Separation with the robot at its initial pose [m]."""
+    worker_before_m: float
+    """Separation with the worker at the initial pose [m]."""
 
 
 def measure_paths(
@@ -344,21 +379,6 @@ def detect_incidents(
         )
         incidents["is_separation_violated"][b, w] = incidents["separation_m"][b, w] < least_m
     return incidents
-
-
-class PathArrays(NamedTuple):
-    """The arrays of `Paths`, as a tuple for compiled functions."""
-
-    robot_world: Capsules
-    """(B, T, K, 2, 3) end points of the robot's capsules [m]."""
-    robot_radius_m: Floats
-    """(K,) radii of the robot's capsules [m]."""
-    workers_world: Capsules
-    """(B, T, W, L, 2, 3) end points of the workers' capsules [m]."""
-    worker_radius_m: Floats
-    """(B, W, L) radii of the workers' capsules [m]."""
-    gaps_m: Floats
-    """(B, T, W) separations between robot and workers [m]."""
 
 
 def _get_path_arrays(paths: Paths) -> PathArrays:
@@ -490,26 +510,6 @@ def _rate_contact(incident: Any, region: BodyRegion, robot_kg: float) -> None:
     incident["force_ratio"] = ratio
     within = WITHIN if ratio <= 1.0 else BEYOND
     incident["severity"] = within if region.is_touched else NEVER
-
-
-class Happened(NamedTuple):
-    """Events of a step in any of the environments."""
-
-    contacts: bool
-    """Whether a contact begins."""
-    approaches: bool
-    """Whether a robot moves towards a worker."""
-
-
-class DirectedGaps(NamedTuple):
-    """Separations of a robot and a worker near the end of a step."""
-
-    end_m: float
-    """Separation at the end of the step [m]."""
-    robot_before_m: float
-    """Separation with the robot at its initial pose [m]."""
-    worker_before_m: float
-    """Separation with the worker at the initial pose [m]."""
 
 
 @kernel(makes_arrays=True)
