@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hrc_env.agents.registry import find_interface
 from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
@@ -92,8 +93,13 @@ class Row:
         return asked or find_task(self.env.get("task", DEFAULT)).max_episode_steps
 
     def keywords(self) -> list[dict[str, Any]]:
-        """Return the arguments of the environments that successive episodes use in turn."""
+        """Return the arguments of the environments that successive episodes use in turn.
+
+        They include the control mode and the optional observations of a trained agent.
+        """
         setup, known = self.setup, dict(self.env)
+        if isinstance(self.agent, str):
+            known = find_interface(self.agent).complete(known)
         known["perception"] = setup.level
         if setup.level in ("keypoints", "pixels"):
             known["estimator"] = setup.estimator

@@ -206,3 +206,10 @@ def test_some_rows_are_selected_with_their_baselines():
     with pytest.raises(ConfigError, match=r"Unknown row of 'cheap' 'pq'"):
         study().select(["pq"])
     assert {row.n_episodes for row in study(n_quick=1).shorten().rows.values()} == {1}
+
+
+def test_the_environment_of_a_policy_has_what_it_observes():
+    agent = "hrc://HRCReach-v0/shielded"
+    (known,) = Row("", 1, agent, env={"shield": None, "config": {"worker": "any"}}).keywords()
+    assert known["config"] == {"worker": "any", "observe_shield": True, "forecast_s": (0.2, 0.4)}
+    assert "config" not in Row("", 1, "scripted").keywords()[0]
