@@ -245,13 +245,13 @@ STUDIES: dict[str, Study] = {
             made=ExperimentSource("benchmarks.ranks", "RanksBench"),
         ),
         "rare": Command(
-            BENCH + "rare", 30, (*KEYPOINTS, "shield", "agents"),
-            (),  # here and below, tables are listed with the results of the first run
-            is_release=True,
+            BENCH + "rare", 30, (*KEYPOINTS, "shield", "agents"), ("rare",), is_release=True,
             made=ExperimentSource("benchmarks.rare.bench", "RareBench"),
         ),
         "adversary": Command(
-            BENCH + "adversary", 30, (*KEYPOINTS, "shield", "agents"), (), is_release=True,
+            BENCH + "adversary", 30, (*KEYPOINTS, "shield", "agents"),
+            (),  # here and below, tables are listed with the results of the first run
+            is_release=True,
             made=ExperimentSource("benchmarks.adversary.bench", "AdversaryBench"),
         ),
         "price": Command(
