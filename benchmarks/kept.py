@@ -2,9 +2,9 @@
 
     python -m benchmarks.kept
 
-The package contains policies that `python -m benchmarks.learners` and `python -m
-benchmarks.limited` trained, at least one for every task. Each one is evaluated without a shield and
-with the shield `qp`, on the same fixed seeds.
+The package contains policies that `python -m benchmarks.learners`, `python -m benchmarks.limited`
+and `python -m benchmarks.under_shield` trained, at least one for every task. Each one is evaluated
+without a shield and with the shield `qp`, on the same fixed seeds.
 """
 
 import sys
@@ -64,7 +64,7 @@ def make_study() -> Study:
         conditions=Conditions(
             people="`attentive`", scene="that of the task", perception="`keypoints`",
             chosen_on=f"policies were trained on {_list_training_seeds()}, with the body "
-            f"`worker_1`; {SHIELD_CHOSEN_ON}",
+            f"`worker_1`{_list_other_bodies()}; {SHIELD_CHOSEN_ON}",
             worker=WORKER,
         ),
     )  # fmt: skip
@@ -75,6 +75,16 @@ def _list_training_seeds() -> str:
     cards = [policies.read(policies.find_path(each)).card for each in policies.list_names()]
     seeds = sorted({card.seed for card in cards})
     return f"seed{'s' if len(seeds) > 1 else ''} {', '.join(map(str, seeds))}"
+
+
+def _list_other_bodies() -> str:
+    """Return the names of the policies that were trained with workers of any body, as text."""
+    names = [
+        address.rpartition("/")[2]
+        for address in policies.list_names()
+        if f"worker={WORKER}" in policies.read(policies.find_path(address)).card.command
+    ]
+    return f" ({', '.join(f'`{name}`' for name in names)}: any body)" if names else ""
 
 
 if __name__ == "__main__":

@@ -163,6 +163,8 @@ def test_counts_stand_with_their_intervals():
         result = tables.read(name)
         missing = result.table.list_unmeasured(result.metrics)
         for column in result.table.columns:
+            if name == "ranks":  # correlations
+                continue
             if "contact" in column.heading or "[in 1,000]" in column.heading:
                 assert column.counted, (name, column)
                 if column in missing:

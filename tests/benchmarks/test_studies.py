@@ -13,7 +13,9 @@ from benchmarks.learning import Training
 from benchmarks.studies import COMMANDS
 from docs import tables
 from hrc_env.agents import policies
+from hrc_env.agents.interface import Interface
 from hrc_env.core.errors import ConfigError
+from hrc_env.experiments import study
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.study import split_row
 from hrc_env.pipeline.levels import LEVELS
@@ -53,7 +55,8 @@ def test_nobody_hands_over_alone():
     assert len(experts.STUDY.rows) == 34
 
 
-def test_a_policy_is_judged_at_the_level_it_learnt_at_but_at_pixels(tmp_path):
+def test_a_policy_is_judged_at_the_level_it_learnt_at_but_at_pixels(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "find_interface", lambda agent: Interface())  # no file is read
     trainings = baselines.make_trainings(baselines.BaselinesArguments(tmp_path))
     assert trainings["pixels", "ppo"] == trainings["keypoints", "ppo"]
     assert trainings["none", "ppo"] == trainings["none", "ppo_safety"]
