@@ -299,7 +299,7 @@ def make_table(seeds: Sequence[int]) -> Table:
 COLUMNS: tuple[Column, ...] = (
     mean("cost", "cost"),
     mean("cost_steps", "steps near", "close_steps"),
-    mean(TOUCHING_STEPS, "steps in contact", "contact_steps"),
+    mean(TOUCHING_STEPS, "touching steps", "contact_steps"),
     rate("contacts_towards", "contacts towards [1/h]", "towards_per_hour", "hour"),
     per_minute(
         APPROACHES, "approaches [1/h]", "approaches_per_minute", "1/min", digits=0, scale=60
