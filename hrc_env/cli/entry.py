@@ -1,6 +1,7 @@
 """Parse and run a command, and print its errors without a traceback."""
 
 import os
+import select
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -34,8 +35,21 @@ def show_errors(run: Callable[[], int]) -> int:
         print("Stopped.", file=sys.stderr)
         return 130
     except BrokenPipeError:
+        if not _is_output_closed():  # another pipe, such as that of a process
+            raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+
+
+def _is_output_closed() -> bool:
+    """Return whether the standard output is a pipe that nothing reads."""
+    try:
+        output = sys.stdout.fileno()
+    except OSError:  # it is captured in memory
+        return False
+    poll = select.poll()
+    poll.register(output, 0)
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def import_first(words: Sequence[str], program: str) -> list[str]:

@@ -55,8 +55,11 @@ def change_fields(record: RecordT, **fields: Any) -> RecordT:
     `dataclasses.replace` also calls `__init__` and `__post_init__`, which takes twice as long.
     """
     kind = type(record)
-    changed = object.__new__(kind)
-    for name in names_of(kind):
+    changed, names = object.__new__(kind), names_of(kind)
+    for name in fields:
+        if name not in names:
+            raise TypeError(f"{kind.__name__} has no field {name!r}, but {', '.join(names)}.")
+    for name in names:
         value = fields[name] if name in fields else getattr(record, name)
         object.__setattr__(changed, name, value)
     return changed

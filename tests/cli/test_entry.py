@@ -9,6 +9,7 @@ import pytest
 
 from hrc_env import __version__
 from hrc_env.__main__ import COMMANDS, MOVED, main
+from hrc_env.cli.entry import show_errors
 
 
 def test_the_overview_names_every_command_and_imports_none(process):
@@ -143,3 +144,13 @@ def test_a_reader_that_ends_early_gets_no_traceback(command: list[str]):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 141
     assert not errors
+
+
+def test_another_broken_pipe_is_not_hidden():
+    """As that of a process that has died."""
+
+    def run() -> int:
+        raise BrokenPipeError("the process has ended")
+
+    with pytest.raises(BrokenPipeError, match="the process has ended"):
+        show_errors(run)
