@@ -24,6 +24,7 @@ from hrc_env.agents.network import Architecture, Network
 from hrc_env.agents.recipes import fill_in
 from hrc_env.agents.registry import make_agent
 from hrc_env.agents.requests import TrainingRequest
+from hrc_env.cli.options import normalize_words
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.safety.shield import SHIELDS
@@ -68,6 +69,7 @@ def here(**kwargs):
 def asked_by(line: str) -> TrainingRequest:
     """What a command line asks for."""
     words = shlex.split(line.removeprefix("python -m hrc_env train"))
+    words = normalize_words(TrainingRequest, words, "train")
     return tyro.cli(TrainingRequest, args=words, config=(tyro.conf.OmitArgPrefixes,))
 
 

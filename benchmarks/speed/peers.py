@@ -151,7 +151,7 @@ class PeersBench:
 
     def settings(self) -> dict[str, Any]:
         """Return the settings on which all results depend."""
-        return {"bench": asdict(self), "has_envpool": find_spec("envpool") is not None}
+        return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Measured:
         """Measure all rounds and the first start; no results are cached."""

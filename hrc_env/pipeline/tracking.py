@@ -323,7 +323,7 @@ class PoseTracking(PerceptionPipeline):
     def _find_due_cameras(self, ids: Ints, expected: PoseEstimate) -> Bools:
         """Return a mask (B, C) of the cameras whose images are used in this step.
 
-        They are all cameras while a worker who may be present is not tracked.
+        They are all cameras while a possibly present worker is not tracked.
         """
         n_cameras = len(self.setup.cameras)
         if self.setup.every == 1:

@@ -13,7 +13,7 @@ Kullback-Leibler divergence).
 
 A trunk that leans little is assumed to be upright, which determines the depth if one view leaves
 the lean uncertain. Head and arms move with a lying trunk. The legs are aligned with the trunk, or
-vertical below it as in a person who bends down, whichever fits better.
+vertical below it as in a bending person, whichever fits better.
 """
 
 import functools
