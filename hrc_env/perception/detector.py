@@ -88,8 +88,9 @@ class DetectorConfig:
     positions are extrapolated."""
     every: int = 1
     """Number of steps from one image that a camera uses to the next; the intervals below are then
-    longer, too. All images are used while a worker is not tracked and may be present. The emulator
-    of `perception="keypoints"` leaves out the same images."""
+    longer, too. All images are used while a worker is not tracked and may be present, or while the
+    measurements disagree with the estimate. The emulator of `perception="keypoints"` leaves out
+    images by the same rule."""
     in_turns: bool = False
     """Whether the cameras use images in turns, 1 / `every` of them in each step, instead of all in
     the same step."""

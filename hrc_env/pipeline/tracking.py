@@ -178,6 +178,11 @@ def make_setup(scene: Scene, config: HRCConfig, is_calibrated: bool = False) -> 
     )
 
 
+MAX_MEAN_MISFIT = 4.0
+"""Mean squared distance of measurements from the estimate above which they disagree, in standard
+deviations squared. It is about 0.5 in a settled track, and 10 in one that faces the wrong way."""
+
+
 class PoseTracking(PerceptionPipeline):
     """A pipeline that tracks people with cameras.
 
@@ -191,7 +196,9 @@ class PoseTracking(PerceptionPipeline):
         sensor: the cameras.
     """
 
-    CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
+    CHANGES = (
+        "state", "keypoints", "sensor", "steps", "disagrees", "frozen", "monitored", "presence",
+    )  # fmt: skip
     N_IMAGES = IMAGES
     """Number of whole images without people that prove absence (see `searched_cameras`)."""
 
@@ -205,6 +212,8 @@ class PoseTracking(PerceptionPipeline):
         self.keypoints = no_keypoints(batch, n_cameras, n_workers)
         self.frozen = make_frozen(batch, n_cameras)
         self.monitored = make_monitor(batch, n_cameras)
+        self.disagrees = np.zeros(batch, np.bool_)
+        """(B,) whether the last measurements of a tracked worker disagree with the estimate."""
         self.presence = Presence(batch, n_workers, setup.coverage)
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
         """(C, 3) principal point (x, y) and focal length of each camera [px]."""
@@ -216,7 +225,7 @@ class PoseTracking(PerceptionPipeline):
         forget_frozen(self.frozen, ids)
         self.presence.forget(ids)
         self.sensor.reset(ids, sensor_rngs)
-        self.steps[ids] = 0
+        self.steps[ids], self.disagrees[ids] = 0, False
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
@@ -262,6 +271,8 @@ class PoseTracking(PerceptionPipeline):
         shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
         looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         estimate = add_agreement(estimate, keypoints, age_s, self.P, self.axes[:, 2])
+        if self.setup.every > 1:
+            self._compare_measurements(ids, estimate, keypoints)
         if self.setup.is_calibrated:
             calibrated = np.ones(estimate.tracked.shape, np.bool_)
             estimate = change_fields(estimate, calibrated=calibrated)
@@ -320,10 +331,21 @@ class PoseTracking(PerceptionPipeline):
         """
         raise NotImplementedError
 
+    def _compare_measurements(
+        self, ids: Ints, estimate: PoseEstimate, keypoints: Keypoints
+    ) -> None:
+        """Note whether new measurements of tracked workers disagree with the estimate."""
+        n_measured = (keypoints.confidence > 0.0).sum((1, 3))
+        misfit = estimate.misfit.sum(-1) / np.maximum(n_measured, 1)
+        disagrees = (estimate.tracked & (misfit > MAX_MEAN_MISFIT)).any(1)
+        is_new = n_measured.any(1)
+        self.disagrees[ids] = np.where(is_new, disagrees, self.disagrees[ids])
+
     def _find_due_cameras(self, ids: Ints, expected: PoseEstimate) -> Bools:
         """Return a mask (B, C) of the cameras whose images are used in this step.
 
-        They are all cameras while a possibly present worker is not tracked.
+        They are all cameras while a possibly present worker is not tracked, and while measurements
+        disagree with an estimate, as at the start of a track that faces the wrong way.
         """
         n_cameras = len(self.setup.cameras)
         if self.setup.every == 1:
@@ -331,7 +353,7 @@ class PoseTracking(PerceptionPipeline):
         c = np.arange(n_cameras) * self.setup.in_turns
         due = (self.steps[ids, None] + c) % self.setup.every == 0
         is_known = expected.tracked | self.presence.slots["absent"][ids]
-        return due | ~np.all(is_known, axis=1, keepdims=True)
+        return due | ~np.all(is_known, axis=1, keepdims=True) | self.disagrees[ids, None]
 
     def _associate(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
         """Assign keypoints to the workers. If there is one worker, it is assigned all of them."""

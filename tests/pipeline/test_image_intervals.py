@@ -11,9 +11,10 @@ import hrc_env
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.perception.detector import PoseDetector
+from hrc_env.pipeline import tracking
 
-SETTLED = 8
-"""Step from which on the worker is tracked."""
+SETTLED = 14
+"""Step from which on the worker is tracked, and measurements agree with the estimate."""
 
 
 class Played(NamedTuple):
@@ -34,7 +35,7 @@ def make(level="keypoints", faults=(), n_workers=1, **detector) -> HRCEnv:
     )  # fmt: skip
 
 
-def play(env: HRCEnv, n_steps=24) -> Played:
+def play(env: HRCEnv, n_steps=30) -> Played:
     env.reset(seed=3)
     shown, used, expected = [], [], []
     for _ in range(n_steps):
@@ -135,3 +136,30 @@ def test_networks_rest_between_the_images_that_are_used(monkeypatch):
     assert tracked > 20
     assert len(calls) <= 31 - tracked // 2
     assert not played.shown[~played.used].any()
+
+
+def test_every_image_is_used_while_measurements_disagree_with_the_track(monkeypatch):
+    """A track that begins facing the wrong way turned too slowly with every second image."""
+    env = make(every=2)
+    env.reset(seed=3)
+    pipeline = env.simulation.pipeline
+    action = np.zeros(env.action_space.shape)
+
+    def count_used(n_steps: int) -> int:
+        used = 0
+        for _ in range(n_steps):
+            env.step(action)
+            used += bool((pipeline.measurements.confidence > 0).any())
+        return used
+
+    count_used(SETTLED)
+    assert not pipeline.disagrees.any()
+    assert count_used(6) == 3
+    monkeypatch.setattr(tracking, "MAX_MEAN_MISFIT", 0.0)  # no measurement agrees
+    count_used(2)
+    assert pipeline.disagrees.all()
+    assert count_used(6) == 6
+    monkeypatch.undo()
+    count_used(1)
+    assert count_used(6) == 3
+    env.close()
