@@ -21,7 +21,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -275,6 +275,7 @@ def publish(name: str) -> None:
         # Some parts may have been computed by earlier runs.
         content["minutes"] = max(content["minutes"], before.get("minutes", 0.0))
     content["machine"].pop("system", None)
+    content["seeds"] = _shorten_seeds(content.get("seeds", []))
     content["date"] = datetime.date.today().isoformat()
     for metric in content.get("metrics", {}).values():
         metric |= {end: float(f"{metric[end]:.6g}") for end in ("value", "low", "high")}
@@ -289,6 +290,12 @@ def publish(name: str) -> None:
         else:
             quality = [cv2.IMWRITE_JPEG_QUALITY, 88]
             cv2.imwrite(str(PICTURES / picture), cv2.imread(str(drawn)), quality)
+
+
+def _shorten_seeds(seeds: Sequence[int]) -> Sequence[int] | dict[str, int]:
+    """Return consecutive seeds as their first and last one; other seeds stay a list."""
+    is_range = len(seeds) > 1 and list(seeds) == [*range(seeds[0], seeds[-1] + 1)]
+    return {"first": seeds[0], "last": seeds[-1]} if is_range else seeds
 
 
 def format_results(content: Mapping[str, Any]) -> str:

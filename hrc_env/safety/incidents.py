@@ -172,8 +172,7 @@ NOT_ALWAYS_MEASURED = (
 """Fields of `Summary` that may be NaN."""
 
 
-@dataclass(frozen=True, slots=True)
-class Paths:
+class Paths(NamedTuple):
     """Capsules of robots and workers at the end of every physics step of a control step."""
 
     robot_world: Capsules
@@ -186,21 +185,6 @@ class Paths:
     """Radii of the workers' capsules (B, W, L) [m]."""
     gaps_m: Floats
     """Separations between robot and workers (B, T, W) [m]."""
-
-
-class PathArrays(NamedTuple):
-    """The arrays of `Paths`, as a tuple for compiled functions."""
-
-    robot_world: Capsules
-    """(B, T, K, 2, 3) end points of the robot's capsules [m]."""
-    robot_radius_m: Floats
-    """(K,) radii of the robot's capsules [m]."""
-    workers_world: Capsules
-    """(B, T, W, L, 2, 3) end points of the workers' capsules [m]."""
-    worker_radius_m: Floats
-    """(B, W, L) radii of the workers' capsules [m]."""
-    gaps_m: Floats
-    """(B, T, W) separations between robot and workers [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,7 +282,8 @@ def measure_paths(
     """
     radii_m = np.repeat(worker_radius_m[:, None], robot_world.shape[1], axis=1)
     gaps_m = least_separation(robot_world, robot_radius_m, workers_world, radii_m).distance_m
-    return Paths(robot_world, robot_radius_m, workers_world, worker_radius_m, gaps_m)
+    arrays = (robot_world, robot_radius_m, workers_world, worker_radius_m, gaps_m)
+    return Paths(*map(np.ascontiguousarray, arrays))  # as kernels require them
 
 
 def find_regions(capsule_names: Sequence[str]) -> Ints:
@@ -353,9 +338,7 @@ def detect_incidents(
     n_steps = paths.robot_world.shape[1]
     took_s = dt_s * (n_steps - 1) / n_steps if n_steps > 1 else np.nan
     first_touch = np.empty(incidents.shape, np.int64)
-    happened = _advance_history(
-        history, incidents, _get_path_arrays(paths), first_touch, took_s, dt_s
-    )
+    happened = _advance_history(history, incidents, paths, first_touch, took_s, dt_s)
     beginning = np.argwhere(incidents["kind"] >= 0).tolist() if happened.contacts else ()
     for b, w in beginning:
         touch = _find_touch(paths, b, w, int(first_touch[b, w]))
@@ -379,17 +362,6 @@ def detect_incidents(
         )
         incidents["is_separation_violated"][b, w] = incidents["separation_m"][b, w] < least_m
     return incidents
-
-
-def _get_path_arrays(paths: Paths) -> PathArrays:
-    """Return the arrays of paths, copied where they are not contiguous."""
-    return PathArrays(
-        robot_world=np.ascontiguousarray(paths.robot_world),
-        robot_radius_m=np.ascontiguousarray(paths.robot_radius_m),
-        workers_world=np.ascontiguousarray(paths.workers_world),
-        worker_radius_m=np.ascontiguousarray(paths.worker_radius_m),
-        gaps_m=np.ascontiguousarray(paths.gaps_m),
-    )
 
 
 def _find_touch(paths: Paths, b: int, w: int, t: int) -> Touch:
@@ -516,7 +488,7 @@ def _rate_contact(incident: Any, region: BodyRegion, robot_kg: float) -> None:
 def _advance_history(
     history: Records2[WorkerHistory],
     incidents: Records2[Incident],
-    paths: PathArrays,
+    paths: Paths,
     first_touch: Ints,
     took_s: float,
     dt_s: float,
@@ -544,12 +516,8 @@ def _advance_history(
             if is_near:
                 gaps = _direct_gaps(paths, b, w, bounds, points)
             past, now, gap = history[b, w], incidents[b, w], gaps.end_m
-            now.separation_m, now.region, now.severity, now.is_separation_violated = (
-                gap,
-                -1,
-                0,
-                False,
-            )
+            now.separation_m, now.region, now.severity = gap, -1, 0
+            now.is_separation_violated = False
             now.robot_m_s = (gaps.robot_before_m - gap) / took_s
             now.worker_m_s = (gaps.worker_before_m - gap) / took_s
             approaches |= now.robot_m_s > MOVING_M_S
@@ -578,9 +546,7 @@ def _find_first_touch(gaps_m: Floats) -> int:
 
 
 @kernel
-def _direct_gaps(
-    paths: PathArrays, b: int, w: int, bounds: Bounds, points: Points3
-) -> DirectedGaps:
+def _direct_gaps(paths: Paths, b: int, w: int, bounds: Bounds, points: Points3) -> DirectedGaps:
     """Return the separations of robot `b` and worker `w`; the other arguments are work arrays."""
     robot, worker, last = paths.robot_world[b], paths.workers_world[b], len(paths.gaps_m[b]) - 1
     radius_m, worker_radius_m = paths.robot_radius_m, paths.worker_radius_m[b, w]

@@ -303,3 +303,10 @@ def test_other_settings_took_another_time(desk):
     (folder / "whole" / "one.json").write_text(json.dumps({"minutes": 42.0, "config": {}}))
     main(Arguments())
     assert results.read_results("one")["minutes"] < 1.0
+
+
+def test_consecutive_seeds_are_published_by_their_ends():
+    """A list of 200,000 made a file of two megabytes."""
+    assert results._shorten_seeds([7, 8, 9]) == {"first": 7, "last": 9}
+    for seeds in ([], [7], [7, 9], [8, 7]):
+        assert results._shorten_seeds(seeds) == seeds
